@@ -254,7 +254,8 @@ fn concluded(
     result.unknowns = reduction.space.size();
     if let Some(error) = error {
         result.estimated_error = result.estimated_error.map(|mesh| mesh + error);
-        result.warnings.extend(beyond(error, compiled.options.errors().requested()).map(coded));
+        let reported = beyond(error, compiled.options.errors().requested());
+        result.warnings.extend(reported.map(|text| coded(format!("{text}; {REMEDY}"))));
     }
     result.warnings.extend(left(excess).map(coded));
     result
@@ -264,14 +265,12 @@ fn coded(message: String) -> String {
     format!("{WARNING}: {message}")
 }
 
+/// What an analysis does about such an error.
+pub(crate) const REMEDY: &str = "take --formulation compliant, or a smaller --tol, which adds directions";
+
 /// Warning about an error by the reduction above the tolerance.
 pub fn beyond(error: f64, tol: f64) -> Option<String> {
-    (error > tol).then(|| {
-        format!(
-            "estimated error of the reduced model {error:.1e}, more than the tolerance {tol:e}; take --formulation compliant, or a smaller --tol, \
-             which adds directions"
-        )
-    })
+    (error > tol).then(|| format!("estimated error of the reduced model {error:.1e}, more than the tolerance {tol:e}"))
 }
 
 /// Warning about a motion beyond what the model was trained for.

@@ -21,6 +21,7 @@ mod accepted_warnings;
 pub mod agitation;
 mod contact_steps;
 mod contract;
+mod free_response;
 mod growth;
 mod half_cycles;
 mod held_motion;

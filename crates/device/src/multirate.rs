@@ -1,6 +1,7 @@
 //! Multirate integration of a session: prediction of macro steps, and correction of the motion at their ends ([`crate::macro_step`]).
 
 use crate::Token;
+use crate::free_response::{ForceResponse, FreeResponse};
 use crate::macro_step::{
     DisplayOffset, MacroStep, MacroStepPosition, PeakMotion, SquareExtrapolation, SquareIntegrals, decay_shares,
     extended, fitted_line, hermite_shares,
@@ -46,6 +47,8 @@ pub(crate) struct Multirate {
     /// Whether a signal or port shows a rate, or may.
     sees_rates: bool,
     stepper: MacroStepper,
+    /// Where voltages act on directions without mass.
+    response: FreeResponse,
     drive: Drive,
     change: Drive,
     push: Vec<Pose>,
@@ -125,7 +128,7 @@ impl SharedVoltage {
         self.row.iter().zip(sources).map(|(row, source)| row * source).sum()
     }
 
-    /// Acceleration per squared voltage, in the norm of masses; infinite where a gap acts on a body without mass.
+    /// Acceleration per squared voltage, in the norm of masses; infinite where a gap acts on a direction without mass.
     fn acceleration(&self, system: &System) -> f64 {
         let squared = |(j, force): (usize, &Pose)| -> f64 {
             let mass = system.model.mass(j);
@@ -143,15 +146,16 @@ pub(crate) struct PredictedStep {
     pub(crate) ends: Option<([f64; 2], f64)>,
     /// Motions there.
     motions: [Motion; 2],
-    /// Acceleration per square of each voltage, in the norm of masses.
-    accelerations: Vec<f64>,
-    /// Allowed errors of displacements and rates at points, in that norm.
-    allowed: [f64; 2],
+    /// Responses per square of each voltage.
+    responses: Vec<ForceResponse>,
+    /// Allowed errors at points of displacements, rates and displacements of directions without mass, in the norm of masses.
+    allowed: [f64; 3],
 }
 
 impl Multirate {
-    /// None for a mechanism with heaters, floating conductors or mechanical inputs, without gap voltages, or with gaps that act on bodies without mass.
-    pub(crate) fn new(system: &System, sees_rates: bool, stepper: MacroStepper) -> Option<Self> {
+    /// None for a mechanism with heaters, floating conductors or mechanical inputs, without gap voltages, or with gaps that act on directions with neither mass
+    /// nor springs. Nothing moves in less than about `shortest` (s).
+    pub(crate) fn new(system: &System, sees_rates: bool, stepper: MacroStepper, shortest: f64) -> Option<Self> {
         let electrics = &system.electrics;
         let (heating, others) = (&electrics.heating, electrics.inputs.len());
         if heating.states() > 0 || heating.means() > 0 || others > 0 || !electrics.floating.is_empty() {
@@ -167,6 +171,7 @@ impl Multirate {
             sees_rates: sees_rates || voltages.len() > 1,
             voltages,
             stepper,
+            response: FreeResponse::new(system, shortest),
             drive: electrics.drive(),
             change: electrics.drive(),
             push: vec![Pose::zeros(); n],
@@ -175,8 +180,40 @@ impl Multirate {
             cache: VecDeque::with_capacity(CACHED),
             corrected: None,
         };
-        multirate.evaluate_forces(system, &vec![Pose::zeros(); n]);
-        multirate.voltages.iter().all(|voltage| voltage.acceleration(system).is_finite()).then_some(multirate)
+        let rest = vec![Pose::zeros(); n];
+        multirate.evaluate_forces(system, &rest);
+        let has_springs = multirate.response.begin(system, &rest, &electrics.drive());
+        (has_springs || multirate.accelerates(system)).then_some(multirate)
+    }
+
+    /// Whether every voltage acts on masses alone.
+    fn accelerates(&self, system: &System) -> bool {
+        self.voltages.iter().all(|voltage| voltage.acceleration(system).is_finite())
+    }
+
+    /// Responses per square of each voltage to the forces that were evaluated, with the tangent at displacements `q` and sources; infinite without one.
+    fn responses(&mut self, system: &System, q: &[Pose], sources: &[f64]) -> Vec<ForceResponse> {
+        let Self { voltages, response, drive, .. } = self;
+        let mut free: Vec<_> = (voltages.iter())
+            .map(|voltage| ForceResponse { acceleration: voltage.acceleration(system), displacement: 0.0 })
+            .collect();
+        if free.iter().all(|found| found.acceleration.is_finite()) {
+            return free;
+        }
+        system.electrics.apply(sources, &[], drive);
+        if response.begin(system, q, drive) {
+            for (found, voltage) in free.iter_mut().zip(voltages).filter(|(found, _)| found.acceleration.is_infinite())
+            {
+                *found = response.of(system, &voltage.force);
+            }
+        }
+        free
+    }
+
+    /// Square of each voltage, less its value at the start of a macro step (V²).
+    pub(crate) fn changes(&self, step: &MacroStep, sources: &[f64]) -> Vec<f64> {
+        let change = |voltage: &SharedVoltage| voltage.volts(sources).powi(2) - voltage.volts(&step.sources).powi(2);
+        self.voltages.iter().map(change).collect()
     }
 
     /// Number of voltages across gaps.
@@ -272,11 +309,12 @@ impl Multirate {
             motions: [step.motion.clone(), step.motion.clone()],
             step,
             ends: None,
-            accelerations: Vec::new(),
-            allowed: [0.0; 2],
+            responses: Vec::new(),
+            allowed: [0.0; 3],
         };
         let Some(relative) = relative_errors((system, weights), &step, errors) else { return failed(step) };
         self.evaluate_forces(system, &step.motion.q);
+        let responses = self.responses(system, &step.motion.q, &step.sources);
         self.set_push(step.extrapolations.iter().map(|square| square.line()));
         let longest = INTEGRATOR_STEPS * step.trial_step;
         let ramp = Ramp::new(&system.electrics, &step.sources, &step.sources, &[], longest)
@@ -297,9 +335,11 @@ impl Multirate {
         let mut drive = self.drive.clone();
         ramp.at(ends.last().copied().unwrap_or_default(), &mut drive);
         let holds = self.stepper.holds(&drive);
-        let allowed = weights.allowed_error(system, [&step.motion, &self.motion], relative.within_step());
-        let allowed = allowed.filter(|_| holds);
-        let (Ok(_), Some(allowed), Some(middle), &[first, last]) = (advanced, allowed, middle, &ends[..]) else {
+        let allowed = |tol: f64| weights.allowed_error(system, [&step.motion, &self.motion], tol).filter(|_| holds);
+        let allowed = allowed(relative.within_step()).zip(allowed(relative.rates_within_step()));
+        let (Ok(_), Some((of_masses, of_others)), Some(middle), &[first, last]) =
+            (advanced, allowed, middle, &ends[..])
+        else {
             return failed(step);
         };
         let of_rates = match self.sees_rates {
@@ -310,8 +350,8 @@ impl Multirate {
             step,
             ends: (first > 0.0 && last > first).then_some(([first, last], h)),
             motions: [middle, self.motion.clone()],
-            accelerations: self.voltages.iter().map(|voltage| voltage.acceleration(system)).collect(),
-            allowed: [allowed, of_rates],
+            responses,
+            allowed: [of_masses, of_rates, of_others],
         }
     }
 
@@ -482,17 +522,21 @@ impl PredictedStep {
         }
     }
 
-    /// Bound of the errors of displacements and rates at a time (s) after the start, relative to the allowed ones.
-    pub(crate) fn error_bound(&self, elapsed: f64, integrals: &[SquareIntegrals]) -> f64 {
-        let squares = self.step.extrapolations.iter().zip(integrals).zip(&self.accelerations);
-        let errors = squares.map(|((square, integrals), acceleration)| {
-            square.residual(*integrals, elapsed).map(|x| x.abs() * acceleration)
-        });
-        let [rate, displacement] = errors.fold([0.0; 2], |[rate, displacement], [r, d]| [rate + r, displacement + d]);
+    /// Bound of the errors of displacements and rates at a time (s) after the start, relative to the allowed ones; `changes` are those of the squares since
+    /// then (V²).
+    pub(crate) fn error_bound(&self, elapsed: f64, integrals: &[SquareIntegrals], changes: &[f64]) -> f64 {
+        let mut errors = [0.0; 3];
+        let squares = self.step.extrapolations.iter().zip(integrals).zip(changes);
+        for (((square, integrals), change), response) in squares.zip(&self.responses) {
+            let [rate, displacement] = square.residual(*integrals, elapsed).map(|x| x.abs() * response.acceleration);
+            let [value, slope] = square.line();
+            let follows = (change - value - slope * elapsed).abs() * response.displacement;
+            errors.iter_mut().zip([displacement, rate, follows]).for_each(|(sum, error)| *sum += error);
+        }
         // zero stays zero where the allowed error is zero
-        let relative = |error: f64, allowed: f64| if error == 0.0 { 0.0 } else { error / allowed };
+        let relative = |(error, allowed): (&f64, &f64)| if *error == 0.0 { 0.0 } else { error / allowed };
         // a sum propagates NaN, a maximum would not
-        let bound = relative(displacement, self.allowed[0]) + relative(rate, self.allowed[1]);
+        let bound: f64 = errors.iter().zip(&self.allowed).map(relative).sum();
         if bound.is_nan() { f64::INFINITY } else { bound }
     }
 }

@@ -141,7 +141,7 @@ impl DeviceSession {
         let sees_rates = sees_rates(&signals, &ports);
         let own = reduction.as_ref().map(|found| found.model.method());
         let stepper = MacroStepper::new(&method, own, system);
-        let multirate = stepper.and_then(|stepper| Multirate::new(system, sees_rates, stepper));
+        let multirate = stepper.and_then(|stepper| Multirate::new(system, sees_rates, stepper, first_step));
         let multirate = multirate.map(Box::new);
         let session = Self {
             held,

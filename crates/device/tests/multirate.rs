@@ -20,6 +20,10 @@ struct MultirateExample {
     pace: f64,
     /// Ranges of the ports of a reduced model; none: the full one.
     ranges: Option<&'static str>,
+    /// Segments of each beam.
+    segments: usize,
+    /// Largest error of rates over edges, of their range (1).
+    rates: f64,
 }
 
 impl MultirateExample {
@@ -36,7 +40,11 @@ const SWITCH: MultirateExample = MultirateExample {
     rest: &[4.0],
     pace: 1.0,
     ranges: None,
+    segments: 1,
+    rates: 2e-2,
 };
+/// Every other body of its beams has no rotary inertia, and its gaps turn these bodies, too.
+const FINE_SWITCH: MultirateExample = MultirateExample { segments: 2, rates: 8e-2, ..SWITCH };
 /// Two voltages; that of the second comb is constant, so that its current is one of the motion.
 const COMB: MultirateExample = MultirateExample {
     file: "comb_resonator/comb_resonator.net",
@@ -44,19 +52,19 @@ const COMB: MultirateExample = MultirateExample {
     rest: &[4.0, 20.0],
     pace: 30.0,
     ranges: None,
+    segments: 1,
+    rates: 2e-2,
 };
 /// The comb as a reduced model.
-const REDUCED_COMB: MultirateExample = MultirateExample { ranges: Some("drive:0:20,sense:0:25"), ..COMB };
+const REDUCED_COMB: MultirateExample = MultirateExample { ranges: Some("drive:0:20,sense:0:25"), segments: 2, ..COMB };
 const TOL: f64 = 1e-3;
 
 fn compiled(example: &MultirateExample, tol: f64) -> Arc<CompiledModel> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples").join(example.file);
     let bundle = read_bundle(&path, &[]).unwrap();
     let junctions = Junctions::Centreline;
-    let (formulation, segments) = match example.ranges {
-        Some(_) => (Formulation::Reduced, Some(2)),
-        None => (Formulation::default(), Some(1)),
-    };
+    let formulation = if example.ranges.is_some() { Formulation::Reduced } else { Formulation::default() };
+    let segments = Some(example.segments);
     let ranges = example.ranges.map(|text| PortRanges::parse(text).unwrap());
     let options = CompileOptions { junctions, segments, tol, formulation, ranges, ..CompileOptions::default() };
     Arc::new(
@@ -121,17 +129,18 @@ fn run(
 }
 
 /// Edges of a circuit push the part by the same impulses as at a thousandth of the tolerance: displacements within half of the tolerance of their range.
-/// Rates are those of higher modes in part, which edges set off and the error of a step weighs little: 1.5e-2 of the switch, 1.2e-2 with steps at every point.
+/// Rates are those of higher modes in part, which edges set off and the error of a step weighs little: 1.5e-2 of the switch, 1.2e-2 with steps at every point;
+/// 7.4e-2 and 7.8e-2 of the switch with two segments a beam.
 #[test]
 fn no_impulse_is_lost() {
-    for example in [&SWITCH, &COMB, &REDUCED_COMB] {
+    for example in [&SWITCH, &FINE_SWITCH, &COMB, &REDUCED_COMB] {
         let tol = example.tol();
         // at a thousandth of the tolerance a reduced model is the full one
         let [run, exact] = [tol, 1e-3 * TOL].map(|tol| {
             let device = &mut opened(example, &compiled(example, tol));
             run((example, device), example.rest[0], edges(example, 3000, 7))
         });
-        for (k, most) in [0.5 * tol, 2e-2].into_iter().enumerate() {
+        for (k, most) in [0.5 * tol, example.rates].into_iter().enumerate() {
             let range = exact.iter().fold(0.0f64, |all, reply| all.max((reply.outputs[k] - exact[0].outputs[k]).abs()));
             let ends = run.iter().zip(&exact);
             let worst = ends.map(|(a, b)| (a.outputs[k] - b.outputs[k]).abs()).fold(0.0, f64::max) / range;
@@ -169,7 +178,8 @@ fn an_alternating_voltage_acts_by_its_mean_square() {
 /// it: rates are those of the displacements.
 #[test]
 fn motion_has_no_jumps() {
-    for (example, height) in [(&SWITCH, 8.0), (&SWITCH, 4.0), (&COMB, 10.0), (&REDUCED_COMB, 10.0)] {
+    for (example, height) in [(&SWITCH, 8.0), (&SWITCH, 4.0), (&FINE_SWITCH, 4.0), (&COMB, 10.0), (&REDUCED_COMB, 10.0)]
+    {
         let dt = example.pace * 5e-10;
         let device = &mut opened(example, &compiled(example, example.tol()));
         let steps = (0..2000).map(|k| (dt, if k % 100 < 50 { 8.0 } else { height }));
@@ -210,7 +220,7 @@ fn currents_of_the_motion_have_no_spikes() {
 /// devices that continue from a snapshot.
 #[test]
 fn trials_are_pure() {
-    for example in [&SWITCH, &COMB, &REDUCED_COMB] {
+    for example in [&SWITCH, &FINE_SWITCH, &COMB, &REDUCED_COMB] {
         let compiled = compiled(example, example.tol());
         // macro steps have tolerances relative to the motion so far
         let steps = (0..30).map(|_| (example.pace * 2e-8, 8.0));
@@ -249,7 +259,7 @@ fn trials_are_pure() {
 /// Points of any length within a macro step have finite outputs and a positive bound of the next one, or fail.
 #[test]
 fn points_of_any_length_are_answered() {
-    for example in [&SWITCH, &COMB, &REDUCED_COMB] {
+    for example in [&SWITCH, &FINE_SWITCH, &COMB, &REDUCED_COMB] {
         let device = &mut opened(example, &compiled(example, example.tol()));
         let rest = example.rest[0];
         let replies = run((example, device), rest, edges(example, 60, 7));

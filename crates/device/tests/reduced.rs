@@ -105,6 +105,51 @@ fn trials_are_reduced() {
     }
 }
 
+/// A voltage that jumps within 1 ns leaves no error by the reduction, though the accelerations that the step carries have one.
+#[test]
+fn jumps_warn_of_no_reduction() {
+    let example = &EXAMPLES[1];
+    let mut device = example.open(Formulation::Reduced);
+    let mut reply = ask(&mut device, Mode::Static, None, 0.0, &[2.0, 20.0]);
+    let mut drive = 2.0;
+    for k in 0..400 {
+        // residuals are taken every twenty accepted states
+        let jumps = k % 20 == 0;
+        drive = if jumps { 16.0 - drive } else { drive };
+        let dt = if jumps { 1e-9 } else { 2e-8 };
+        reply = ask(&mut device, Mode::Transient, reply.token, dt, &[drive, 20.0]);
+        let warnings = device.warns(reply.token.unwrap());
+        assert!(warnings.iter().all(|warning| warning.code != "W053"), "point {k}: {warnings:?}");
+        device.accept(reply.token.unwrap());
+    }
+}
+
+/// `auto` has the reduced model where ranges are given and it is cheaper, and otherwise the full one without a warning: without ranges, below a tolerance of
+/// 5e-3, and for a model of so few unknowns as the chevron.
+#[test]
+fn auto_is_reduced_within_ranges() {
+    let opened = |compiled: CompiledModel| {
+        let mut device = LocalDevice::new(Arc::new(compiled));
+        let opened = device.open(&OpenRequest::default()).unwrap();
+        let rest = ask(&mut device, Mode::Static, None, 0.0, &vec![1.0; opened.ports.len()]);
+        (opened.unknowns, codes(&mut device, &rest))
+    };
+    let chosen = |name: &str, ranges: Option<&str>| Arc::unwrap_or_clone(compiled(name, ranges, Formulation::Auto));
+    for example in &EXAMPLES {
+        let reduced =
+            opened(Arc::unwrap_or_clone(compiled(example.name, Some(example.ranges), Formulation::Reduced))).0;
+        let given = chosen(example.name, Some(example.ranges));
+        let full = (given.unknowns(), Vec::new());
+        assert_eq!(opened(given.clone()), (reduced, Vec::new()), "{}", example.name);
+        assert_eq!(opened(given.clone().for_given_steps()), (reduced, Vec::new()), "{}", example.name);
+        assert_eq!(opened(given.with_tolerance(1e-3)), full, "{}", example.name);
+        assert_eq!(opened(chosen(example.name, None)), full, "{}", example.name);
+    }
+    let few = chosen("chevron", Some("heat:0:3"));
+    let unknowns = few.unknowns();
+    assert_eq!(opened(few), (unknowns, Vec::new()));
+}
+
 /// Fourth-order differences of charges, currents and outputs agree with the partials: to 1e-6 of the largest entry of each row for a
 /// single internal step, where the partials are exact, and to 1e-3 when a trial takes several.
 #[test]

@@ -76,8 +76,8 @@ class Options(TypedDict, total=False):
     ranges: str | None
     """Ranges of what is given to ports (V, N, W), for which a reduced model is trained
     (docs/explanation/reduction.md). Without them tran trains for its own values, and circuits have the full
-    model. Range: NAME:LOW:HIGH with LOW below HIGH, finite and once for each port, separated by commas (in
-    decks by bars); default: none."""
+    model. In circuits auto takes the reduced model for them from a tol of 5e-3 on. Range: NAME:LOW:HIGH with
+    LOW below HIGH, finite and once for each port, separated by commas (in decks by bars); default: none."""
 
 
 WIRE = {

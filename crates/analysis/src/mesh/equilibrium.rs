@@ -370,7 +370,8 @@ fn point_fitted(
     let warned = |message: String| Diagnostic::warning(reduced::WARNING, message, "");
     match reduced::equilibrium(&fitted, &point) {
         Ok(found) => {
-            fitted.warnings.items.extend(reduced::beyond(found.error, tol).map(warned));
+            let reported = reduced::beyond(found.error, tol).map(|text| format!("{text}; {}", reduced::REMEDY));
+            fitted.warnings.items.extend(reported.map(warned));
             fitted.order.estimated_error = fitted.order.estimated_error.map(|mesh| mesh + found.error);
             Ok((fitted, found.point, Some(found.directions)))
         }

@@ -32,6 +32,8 @@ pub(crate) struct ReductionErrorSum {
     accepted: u64,
 }
 
+/// Unknowns of the full model for each coordinate from which on `auto` takes the reduced one (1).
+const CHEAPER: usize = 10;
 /// Accepted states from one residual to the next.
 const EVERY: u64 = 20;
 
@@ -51,10 +53,7 @@ impl SessionReduction {
         let error = &mut self.error;
         error.accepted += 1;
         if error.accepted % EVERY == 1 {
-            let push = match carried {
-                [] => method.consistent_accelerations(&Motion { q: q.to_vec(), v: v.to_vec() }, drive),
-                _ => method.accelerations(carried),
-            };
+            let push = method.consistent_accelerations(carried, (q, v), drive);
             let mut taken: Vec<Pose> =
                 push.iter().enumerate().map(|(j, push)| system.model.mass(j).component_mul(push)).collect();
             forces::add_damping(&system.model, v, &mut taken);
@@ -79,17 +78,36 @@ impl SessionReduction {
     /// shortest time in which something moves (s).
     ///
     /// # Errors
-    /// Why the session has the full model instead.
+    /// Why the session has the full model though a reduced one is requested.
     pub(crate) fn requested(
+        compiled: &CompiledModel,
+        system: &System,
+        ports: Ports<'_>,
+        times: (bool, f64),
+        known: Option<&Arc<CircuitReduction>>,
+    ) -> Result<Option<Self>, String> {
+        match (compiled.requested.formulation, compiled.options.formulation) {
+            (_, Formulation::Reduced) => Self::trained(compiled, system, ports, times, known).map(Some),
+            // the steps of others are far longer than the training
+            (Formulation::Auto, Formulation::Auto | Formulation::Compliant) if compiled.options.ranges.is_some() => {
+                let found = Self::trained(compiled, system, ports, times, known).ok();
+                Ok(found.filter(|found| CHEAPER * found.model.space.size() <= system.model.unknowns()))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// A reduced model for some ports.
+    ///
+    /// # Errors
+    /// Why there is none.
+    fn trained(
         compiled: &CompiledModel,
         system: &System,
         (names, sources, kinds): Ports<'_>,
         (shaken, shortest): (bool, f64),
         known: Option<&Arc<CircuitReduction>>,
-    ) -> Result<Option<Self>, String> {
-        if compiled.options.formulation != Formulation::Reduced {
-            return Ok(None);
-        }
+    ) -> Result<Self, String> {
         if shaken {
             return Err("thermal agitation acts on every body".to_owned());
         }
@@ -101,6 +119,6 @@ impl SessionReduction {
             None => Arc::new(CircuitReduction::train(compiled, system, (names, sources), shortest)?),
         };
         let (statics, check) = (ReducedStatics::new(&model.space), FullCheck::new(system));
-        Ok(Some(Self { statics, check, error: ReductionErrorSum::default(), model }))
+        Ok(Self { statics, check, error: ReductionErrorSum::default(), model })
     }
 }

@@ -125,6 +125,7 @@ options! {
 
     /// Ranges of what is given to ports (V, N, W), for which a reduced model is trained
     /// (docs/explanation/reduction.md). Without them tran trains for its own values, and circuits have the full model.
+    /// In circuits auto takes the reduced model for them from a tol of 5e-3 on.
     ranges: Option<PortRanges> = None, "ranges" = 18, [""], Range::Ranges, "none";
 }
 

@@ -114,17 +114,15 @@ impl ReducedRodas4 {
         self.polynomials.as_ref().map_or(0.0, |stages| stages.largest)
     }
 
-    /// Accelerations of the bodies in a state.
-    pub fn accelerations(&mut self, state: &[Motion]) -> &[Pose] {
-        self.resume(Some(state));
-        self.forces.place(&self.space, self.now.parts());
-        &self.forces.placed.acceleration
-    }
-
-    /// The same at a motion of the bodies alone, with what the forces at `drive` bring.
-    pub fn consistent_accelerations(&mut self, motion: &Motion, drive: &Drive) -> &[Pose] {
-        self.resume(None);
-        self.project(motion);
+    /// Accelerations of the bodies that the forces at `drive` bring in a state; one that carries nothing is that of the bodies' `motion`. Those that a state
+    /// carries have an error after a step in which a voltage jumps.
+    pub fn consistent_accelerations(&mut self, state: &[Motion], motion: (&[Pose], &[Pose]), drive: &Drive) -> &[Pose] {
+        if state.is_empty() {
+            self.resume(None);
+            self.project(&Motion { q: motion.0.to_vec(), v: motion.1.to_vec() });
+        } else {
+            self.resume(Some(state));
+        }
         self.drive.clone_from(drive);
         if self.make_consistent().is_err() {
             let [_, _, w] = self.now.parts_mut();
