@@ -11,9 +11,9 @@
 //! times as stiff, mapped to joint coordinates and projected onto the loops.
 
 mod in_joints;
+mod locked_directions;
 mod on_tree;
 mod report;
-mod rotary;
 
 use super::formulation::{Formulation, coordinate_scales, linkage, locked_model};
 use super::integrator::{IntegrationRule, Integrator};
@@ -26,9 +26,9 @@ use bimorph_multibody::joint_coordinates::constrained_loops::Linkage;
 use bimorph_solve::equations::Motion;
 use bimorph_solve::fastest::{Fastest, fastest};
 use in_joints::JointPropagator;
+pub use locked_directions::RIGID;
 use on_tree::on_tree;
 pub use report::JointReport;
-pub use rotary::RIGID;
 use std::f64::consts::TAU;
 
 /// Steps beyond which a run is refused before it begins.
@@ -64,7 +64,7 @@ pub fn joint_transient(
     if let (Some(top), IntegrationRule::Rk45, None) = (&top, rule, options.step) {
         affordable(formulation, &linkage, top, options.stop)?;
     }
-    let start = options.release.map(|start| rotary::locked(start, formulation));
+    let start = options.release.map(|start| locked_directions::locked(start, formulation));
     let mut carrier = JointPropagator {
         formulation,
         system,
@@ -84,10 +84,10 @@ pub fn joint_transient(
         linkage,
         scale,
     };
-    let rotary = rotary::rotary_inertia_warning(compiled, formulation, options);
+    let warning = locked_directions::locked_directions_warning(compiled, formulation, options);
     let options = options.with_release(start.as_ref());
     let mut result = record(compiled, &options, &mut carrier, sample, watch)?;
-    result.warnings.extend(rotary);
+    result.warnings.extend(warning);
     result.warnings.extend(open(carrier.report.largest_gap_m, options.errors().within(system.length_scale)));
     result.unknowns = carrier.linkage.coordinates.saturating_sub(carrier.linkage.constraints);
     Ok((result, carrier.report))

@@ -17,7 +17,7 @@ pub(super) fn locked(compiled: &CompiledModel, formulation: Formulation) -> Comp
 
 /// A warning where the equilibrium that a run comes from, or goes to, is further than the tolerance from that of the elastic beams: the
 /// largest difference of two displacements of a node over the largest displacement. None where one of the two has no equilibrium.
-pub(super) fn rotary_inertia_warning(
+pub(super) fn locked_directions_warning(
     compiled: &CompiledModel,
     formulation: Formulation,
     options: &TransientOptions<'_>,
