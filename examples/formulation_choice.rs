@@ -1,4 +1,5 @@
-//! The choice of `auto` against each formulation, on random mechanisms: `FIRST COUNT` of them, all 100 by default.
+//! The choice of `auto` against each formulation, on random mechanisms: `FIRST COUNT` of them, all 100 by default. With `formulations` before these no other
+//! method runs.
 //!
 //!     taskset -c 0 cargo run --release --example formulation_choice > choice.csv
 //!
@@ -113,6 +114,7 @@ impl Way {
 
 fn main() {
     let given: Vec<usize> = std::env::args().skip(1).filter_map(|word| word.parse().ok()).collect();
+    let methods = if std::env::args().any(|word| word == "formulations") { &[][..] } else { &METHODS[..] };
     let (first, count) = (given.first().copied().unwrap_or(0), given.get(1).copied().unwrap_or(SCENES));
     println!(
         "scene,kind,tol,formulation,took,error,reported,steps,all_steps,runs_ms,whole_ms,work,shortest_s,segments"
@@ -123,7 +125,7 @@ fn main() {
             println!("{number},{},no equilibrium or no mode", KINDS[number % KINDS.len()]);
             continue;
         };
-        TOLERANCES.iter().for_each(|tol| compare(number, &scene, *tol, &mut counts));
+        TOLERANCES.iter().for_each(|tol| compare(number, &scene, (*tol, methods), &mut counts));
     }
     eprintln!("{counts:?}");
 }
@@ -141,8 +143,8 @@ struct Summary {
     short: Vec<(usize, f64, f64)>,
 }
 
-/// Every formulation on one mechanism at one tolerance.
-fn compare(number: usize, scene: &Scene, tol: f64, counts: &mut Summary) {
+/// Every formulation on one mechanism at one tolerance, and bodies by other methods.
+fn compare(number: usize, scene: &Scene, (tol, methods): (f64, &[Integrator]), counts: &mut Summary) {
     let reference = run(scene, Way::by(Formulation::Auto, tol / 100.0), 1);
     let line = |name: &str, done: &Result<Done, String>| {
         print!("{number},{},{tol:e},{name},", KINDS[number % KINDS.len()]);
@@ -180,7 +182,7 @@ fn compare(number: usize, scene: &Scene, tol: f64, counts: &mut Summary) {
         accepted += usize::from(done.is_ok());
         if formulation == Formulation::Compliant {
             let longest = done.as_ref().map_or(PATIENCE, |done| (LONGEST * 1e-3 * done.whole).min(PATIENCE));
-            for method in METHODS {
+            for &method in methods {
                 let way = Way { method, patience: longest, ..Way::by(formulation, tol) };
                 line(method.name(), &run(scene, way, 3));
             }

@@ -272,8 +272,8 @@ fn every_scheme_bends() {
     }
 }
 
-/// Schemes e4 and es have the same limit at finite strain where beams meet in points: the tip of a cantilever ten times as long as wide, turned by 1.07 rad, which
-/// is a strain of 10 %, to 1e-6 of its way. With calibrated junctions they agree to first order in the rotation of the junction, and are 1e-3 apart there.
+/// Schemes e4 and es have the same limit at finite strain where beams meet in points. The tip of a cantilever ten times as long as wide, turned by 1.07 rad, which
+/// is a strain of 10 %, agrees to 1e-6 of its way. With calibrated junctions they agree to first order in the rotation of the junction, and are 1e-3 apart there.
 #[test]
 fn schemes_share_limits_at_finite_strain() {
     let apart = |junctions| {

@@ -265,7 +265,7 @@ fn coded(message: String) -> String {
     format!("{WARNING}: {message}")
 }
 
-/// What an analysis does about such an error.
+/// The remedy that an analysis names.
 pub(crate) const REMEDY: &str = "take --formulation compliant, or a smaller --tol, which adds directions";
 
 /// Warning about an error by the reduction above the tolerance.

@@ -23,7 +23,7 @@ pub(crate) struct FreeResponse {
     gamma: f64,
 }
 
-/// What a force brings, in the norm of masses.
+/// The effect of a force, in the norm of masses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ForceResponse {
     /// Acceleration (√kg·m/s²).

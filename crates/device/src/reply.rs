@@ -162,13 +162,8 @@ impl DeviceSession {
                 }
             }
             for g in 0..gaps {
-                let dq = if electrics.floating.of_gap(g).is_some() {
-                    system.charge_slope(g, (view.q, view.volts), (&s.q, Some(&gap_row)))
-                } else {
-                    let is_moved = moves && view.volts[g] != 0.0;
-                    let moved = if is_moved { system.capacitance_slope(g, view.q, &s.q) * view.volts[g] } else { 0.0 };
-                    self.capacitances[g] * gap_row[g] + moved
-                };
+                let (about, change) = ((view.q, view.volts), (moves.then_some(&s.q[..]), Some(&gap_row[..])));
+                let dq = system.charge_slope_with(|| self.capacitances[g], g, about, change);
                 for (row, &other) in self.ports.sources.iter().enumerate() {
                     if self.ports.answers[row] == PortResponse::Current {
                         reply.dq_dv[row * ports + p] += electrics.gap_rows[(g, other)] * dq;

@@ -129,8 +129,8 @@ fn run(
 }
 
 /// Edges of a circuit push the part by the same impulses as at a thousandth of the tolerance: displacements within half of the tolerance of their range.
-/// Rates are those of higher modes in part, which edges set off and the error of a step weighs little: 1.5e-2 of the switch, 1.2e-2 with steps at every point;
-/// 7.4e-2 and 7.8e-2 of the switch with two segments a beam.
+/// Rates are those of higher modes in part, which edges set off and the error of a step weighs little: 1.5e-2 of the switch, 1.2e-2 with steps at every point.
+/// With two segments a beam they are 7.4e-2 and 7.8e-2.
 #[test]
 fn no_impulse_is_lost() {
     for example in [&SWITCH, &FINE_SWITCH, &COMB, &REDUCED_COMB] {

@@ -81,21 +81,31 @@ impl System {
 
     /// Change of that charge with a change of the configuration and of the voltages; none: they are held.
     #[inline]
-    pub fn charge_slope(
+    pub fn charge_slope(&self, gap: usize, about: (&[Pose], &[f64]), (dq, change): (&[Pose], Option<&[f64]>)) -> f64 {
+        self.charge_slope_with(|| self.capacitance(gap, about.0), gap, about, (Some(dq), change))
+    }
+
+    /// The same with its capacitance (F), and with a configuration that may be held.
+    #[inline]
+    pub fn charge_slope_with(
         &self,
+        capacitance: impl FnOnce() -> f64,
         gap: usize,
         (q, volts): (&[Pose], &[f64]),
-        (dq, change): (&[Pose], Option<&[f64]>),
+        (dq, change): (Option<&[Pose]>, Option<&[f64]>),
     ) -> f64 {
+        let moved = |volts: f64| match dq {
+            Some(dq) if volts != 0.0 => self.capacitance_slope(gap, q, dq) * volts,
+            _ => 0.0,
+        };
         if self.electrics.floating.of_gap(gap).is_some() {
-            let held = vec![0.0; volts.len()];
-            let change = self.gap_voltage_slopes((q, volts), (dq, change.unwrap_or(&held)));
-            let volts = self.floated(q, volts);
-            return self.capacitance(gap, q) * change[gap] + self.capacitance_slope(gap, q, dq) * volts[gap];
+            let (held, still) = (vec![0.0; volts.len()], vec![Pose::zeros(); q.len()]);
+            let change = self.gap_voltage_slopes((q, volts), (dq.unwrap_or(&still), change.unwrap_or(&held)));
+            return capacitance() * change[gap] + moved(self.floated(q, volts)[gap]);
         }
         let changed = change.map_or(0.0, |change| change[gap]);
-        let charged = if changed == 0.0 { 0.0 } else { self.capacitance(gap, q) * changed };
-        charged + if volts[gap] == 0.0 { 0.0 } else { self.capacitance_slope(gap, q, dq) * volts[gap] }
+        let charged = if changed == 0.0 { 0.0 } else { capacitance() * changed };
+        charged + moved(volts[gap])
     }
 
     /// `tangent +=` a fraction of k·S⁻¹·kᵀ, k the change of the forces with the potentials of floating conductors, at the voltages `volts` of gaps.

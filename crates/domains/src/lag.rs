@@ -100,6 +100,12 @@ impl Lags {
         });
         self.kept[place].get_or_insert_with(|| Lag::new(time_constant, self.t))
     }
+
+    /// Change of a rise whose steady value changes by p₁·s + p₂·s² (K) and which follows it at once without a time constant (s).
+    #[inline]
+    pub fn change(&mut self, time_constant: f64, [p1, p2]: [f64; 2]) -> f64 {
+        if time_constant > 0.0 { self.of(time_constant).rise(0.0, [0.0, p1, p2]) } else { self.t * (p1 + self.t * p2) }
+    }
 }
 
 #[cfg(test)]

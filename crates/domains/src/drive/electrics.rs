@@ -257,9 +257,8 @@ impl Electrics {
         }
         let mut lags = Lags::new(s);
         for (k, heater) in self.heating.heaters.iter().enumerate() {
-            let [p1, p2] = self.heat_course_change(k, way, dt, port);
-            let tau = heater.time_constant;
-            put(k, if tau > 0.0 { lags.of(tau).rise(0.0, [0.0, p1, p2]) } else { s * (p1 + s * p2) });
+            let change = self.heat_course_change(k, way, dt, port);
+            put(k, lags.change(heater.time_constant, change));
         }
     }
 

@@ -291,10 +291,8 @@ impl<'a> Ramp<'a> {
             if changes.is_empty() {
                 out.expansion.fill(0.0);
             }
-            for ((strain, heater), [p1, p2]) in out.expansion.iter_mut().zip(heaters).zip(changes) {
-                let tau = heater.time_constant;
-                let rise = if tau > 0.0 { lags.of(tau).rise(0.0, [0.0, *p1, *p2]) } else { s * (p1 + s * p2) };
-                *strain = heater.expansion * rise;
+            for ((strain, heater), change) in out.expansion.iter_mut().zip(heaters).zip(changes) {
+                *strain = heater.expansion * lags.change(heater.time_constant, *change);
             }
         }
         out.load = 0.0;
