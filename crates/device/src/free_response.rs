@@ -77,3 +77,62 @@ impl FreeResponse {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bimorph_base::Bundle;
+    use bimorph_model::compile::{CompileOptions, CompiledModel, Junctions, draw};
+    use bimorph_netlist::NetlistSource;
+
+    /// A beam of 100 × 2 × 2 µm in two segments, whose inner body has no rotary inertia.
+    fn beam(end: &str) -> CompiledModel {
+        let text = format!(
+            "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbeam2d p [a b] [l=100u w=2u]\n{end}"
+        );
+        let options =
+            CompileOptions { segments: Some(2), junctions: Junctions::Centreline, ..CompileOptions::default() };
+        let bundle = Bundle::from_text("beam.net", &text);
+        draw(&NetlistSource::new(&bundle), &options).and_then(|drawn| drawn.compile()).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    /// The response to a force on the heaviest body, which is the inner one.
+    fn of_inner(system: &System, shortest: f64, force: Pose) -> ForceResponse {
+        let n = system.bodies();
+        let mut response = FreeResponse::new(system, shortest);
+        assert!(response.begin(system, &vec![Pose::zeros(); n], &system.electrics.drive()));
+        let mut forces = vec![Pose::zeros(); n];
+        let inner = (0..n).max_by(|a, b| system.model.mass(*a).x.total_cmp(&system.model.mass(*b).x)).unwrap();
+        assert_eq!(system.model.mass(inner).z, 0.0);
+        forces[inner] = force;
+        response.of(system, &forces)
+    }
+
+    fn same(found: f64, expected: f64) {
+        assert!((found / expected - 1.0).abs() < 1e-5, "{found:e} {expected:e}");
+    }
+
+    /// Between two anchors a force F on the inner body of mass m accelerates it by F/m. A moment τ turns it by τ·l/(8EI) against segments of length l, and
+    /// accelerates nothing.
+    #[test]
+    fn moments_turn_directions_without_mass() {
+        let compiled = beam("anchor p [b] []");
+        let system = &compiled.parts.system;
+        let mass = system.model.mass(0).y;
+        same(of_inner(system, 1e-9, Pose::new(0.0, 1e-6, 0.0)).acceleration, 1e-6 / mass.sqrt());
+        let turned = of_inner(system, 1e-9, Pose::new(0.0, 0.0, 1e-12));
+        let angle = 1e-12 * 50e-6 / (8.0 * 165e9 * 2e-6 * 2e-6f64.powi(3) / 12.0);
+        same(turned.displacement, angle * system.length_scale * mass.sqrt());
+        assert!(turned.acceleration < 1e-9 * 1e-12 / 50e-6 / mass.sqrt(), "{turned:?}");
+    }
+
+    /// At a free end springs pass a moment on to masses. Their acceleration does not depend on γ.
+    #[test]
+    fn springs_pass_moments_on_to_masses() {
+        let compiled = beam("");
+        let [one, other] = [1e-9, 1e-10]
+            .map(|shortest| of_inner(&compiled.parts.system, shortest, Pose::new(0.0, 0.0, 1e-12)).acceleration);
+        assert!(one > 0.1 * 1e-12 / 50e-6 / compiled.parts.system.model.mass(0).y.sqrt(), "{one:e}");
+        same(one, other);
+    }
+}
