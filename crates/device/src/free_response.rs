@@ -44,13 +44,13 @@ impl FreeResponse {
         }
     }
 
-    /// Takes the tangent at displacements `q`. False where directions without mass have no springs.
+    /// Takes the tangent at displacements `q`. False where directions without mass have no springs, or unstable ones.
     pub(crate) fn begin(&mut self, system: &System, q: &[Pose], drive: &Drive) -> bool {
         let Self { matrix, residual, gamma, .. } = self;
         system.tangent(q, drive, matrix, residual);
         forces::add_inertia(&system.model, 1.0 / (*gamma * *gamma), 0.0, matrix);
         system.model.project_matrix(matrix);
-        matrix.factor(&system.model.pattern).is_ok()
+        matrix.factor(&system.model.pattern).is_ok_and(|signs| signs.negative == 0)
     }
 
     /// The response to a force on each body (N, N·m), with the tangent taken before.
