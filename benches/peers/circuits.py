@@ -30,15 +30,17 @@ REPEATS = 3
 
 class Bench:
     def __init__(self, plugin, folder):
-        self.plugin, self.folder = plugin, Path(folder)
+        self.folder = Path(folder)
         (self.folder / "comb.net").write_text((DECKS / "comb.net").read_text())
+        # ngspice writes the paths of a deck in small letters
+        (self.folder / "bimorph.cm").symlink_to(Path(plugin).resolve())
 
     def deck(self, name, step, relative, stop):
         drive = re.sub(r"reltol=\S+", f"reltol={relative:g}", (DECKS / "comb_drive.inc").read_text())
         text = (DECKS / name).read_text().replace(".include comb_drive.inc\n", drive + "\n")
         text = re.sub(r"tol=1e-5\)", f"tol={max(relative, 1e-5):g})", text)
         lines = [line for line in text.splitlines() if not re.match(r"\.(op|ac|tran|end)\b", line)]
-        lines += [".control", f"pre_codemodel {self.plugin}", f"tran {step:g} {stop:g} 0 {step:g}", "wrdata out v(x)", "quit", ".endc", ".end"]
+        lines += [".control", "pre_codemodel ./bimorph.cm", f"tran {step:g} {stop:g} 0 {step:g}", "wrdata out v(x)", "quit", ".endc", ".end"]
         (self.folder / "run.cir").write_text("\n".join(lines) + "\n")
 
     def seconds(self, name, step, relative, stop):

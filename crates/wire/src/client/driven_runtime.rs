@@ -57,6 +57,7 @@ impl DrivenRuntime {
     /// A loop with its thread, which ends with [`DrivenRuntime::end`].
     pub(super) fn new() -> io::Result<Arc<Self>> {
         let runtime = Builder::new_current_thread().enable_all().build()?;
+        fail_writes(&runtime)?;
         let (state, over, asked, soon) = (Mutex::default(), Condvar::new(), Notify::new(), AtomicBool::new(true));
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let new = Arc::new(Self { runtime: Some(runtime), state, over, asked, soon, cores });
@@ -149,10 +150,40 @@ impl DrivenRuntime {
     }
 }
 
+/// A write to a server that has gone fails. Its signal ends a host that is no Rust program, as ngspice is, unless it is handled.
+#[cfg(unix)]
+fn fail_writes(runtime: &Runtime) -> io::Result<()> {
+    use tokio::signal::unix::{SignalKind, signal};
+    let _inside = runtime.enter();
+    signal(SignalKind::pipe()).map(drop)
+}
+
+/// Such a write has no signal here.
+#[cfg(not(unix))]
+fn fail_writes(_: &Runtime) -> io::Result<()> {
+    Ok(())
+}
+
 impl Drop for DrivenRuntime {
     fn drop(&mut self) {
         if let Some(runtime) = self.runtime.take() {
             runtime.shutdown_background();
         }
+    }
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+
+    /// With a loop the signal of a broken pipe (13) is handled, so that it ends no process.
+    #[test]
+    fn broken_pipes_are_handled() {
+        let driven = DrivenRuntime::new().unwrap();
+        let status = std::fs::read_to_string("/proc/self/status").unwrap();
+        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap();
+        let caught = u64::from_str_radix(caught.trim(), 16).unwrap();
+        driven.end();
+        assert_eq!(caught >> 12 & 1, 1, "{status}");
     }
 }
