@@ -19,9 +19,9 @@
 
 mod accepted_warnings;
 pub mod agitation;
+mod condensed_response;
 mod contact_steps;
 mod contract;
-mod free_response;
 mod growth;
 mod half_cycles;
 mod held_motion;

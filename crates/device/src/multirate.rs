@@ -1,7 +1,7 @@
 //! Multirate integration of a session: prediction of macro steps, and correction of the motion at their ends ([`crate::macro_step`]).
 
 use crate::Token;
-use crate::free_response::{ForceResponse, FreeResponse};
+use crate::condensed_response::{CondensedResponse, ForceResponse};
 use crate::macro_step::{
     DisplayOffset, MacroStep, MacroStepPosition, PeakMotion, SquareExtrapolation, SquareIntegrals, decay_shares,
     extended, fitted_line, hermite_shares,
@@ -47,8 +47,10 @@ pub(crate) struct Multirate {
     /// Whether a signal or port shows a rate, or may.
     sees_rates: bool,
     stepper: MacroStepper,
-    /// Where voltages act on directions without mass.
-    response: FreeResponse,
+    /// Where voltages act on directions without mass; from the first such force on.
+    response: Option<CondensedResponse>,
+    /// About the shortest time in which something moves (s).
+    shortest: f64,
     drive: Drive,
     change: Drive,
     push: Vec<Pose>,
@@ -171,7 +173,8 @@ impl Multirate {
             sees_rates: sees_rates || voltages.len() > 1,
             voltages,
             stepper,
-            response: FreeResponse::new(system, shortest),
+            response: None,
+            shortest,
             drive: electrics.drive(),
             change: electrics.drive(),
             push: vec![Pose::zeros(); n],
@@ -182,38 +185,40 @@ impl Multirate {
         };
         let rest = vec![Pose::zeros(); n];
         multirate.evaluate_forces(system, &rest);
-        let has_springs = multirate.response.begin(system, &rest, &electrics.drive());
-        (has_springs || multirate.accelerates(system)).then_some(multirate)
+        multirate.tangent_is_needed(system);
+        let drive = electrics.drive();
+        multirate.response.as_mut().is_none_or(|response| response.begin(system, &rest, &drive)).then_some(multirate)
     }
 
-    /// Whether every voltage acts on masses alone.
-    fn accelerates(&self, system: &System) -> bool {
-        self.voltages.iter().all(|voltage| voltage.acceleration(system).is_finite())
+    /// Whether a voltage acts on a direction without mass, with storage for its response then.
+    fn tangent_is_needed(&mut self, system: &System) -> bool {
+        let is_needed = self.voltages.iter().any(|voltage| voltage.acceleration(system).is_infinite());
+        if is_needed && self.response.is_none() {
+            self.response = Some(CondensedResponse::new(system, self.shortest));
+        }
+        is_needed
     }
 
     /// Responses per square of each voltage to the forces that were evaluated, with the tangent at displacements `q` and sources; infinite without one.
-    fn responses(&mut self, system: &System, q: &[Pose], sources: &[f64]) -> Vec<ForceResponse> {
+    fn responses(&mut self, about: (&System, &NormWeights), q: &[Pose], sources: &[f64]) -> Vec<ForceResponse> {
+        let system = about.0;
+        let is_needed = self.tangent_is_needed(system);
         let Self { voltages, response, drive, .. } = self;
-        let mut free: Vec<_> = (voltages.iter())
-            .map(|voltage| ForceResponse { acceleration: voltage.acceleration(system), displacement: 0.0 })
-            .collect();
-        if free.iter().all(|found| found.acceleration.is_finite()) {
-            return free;
-        }
-        system.electrics.apply(sources, &[], drive);
-        if response.begin(system, q, drive) {
-            for (found, voltage) in free.iter_mut().zip(voltages).filter(|(found, _)| found.acceleration.is_infinite())
-            {
-                *found = response.of(system, &voltage.force);
+        let mut tangent = response.as_mut().filter(|_| is_needed);
+        if let Some(response) = &mut tangent {
+            system.electrics.apply(sources, &[], drive);
+            if !response.begin(system, q, drive) {
+                tangent = None;
             }
         }
-        free
-    }
-
-    /// Square of each voltage, less its value at the start of a macro step (V²).
-    pub(crate) fn changes(&self, step: &MacroStep, sources: &[f64]) -> Vec<f64> {
-        let change = |voltage: &SharedVoltage| voltage.volts(sources).powi(2) - voltage.volts(&step.sources).powi(2);
-        self.voltages.iter().map(change).collect()
+        let of = |voltage: &SharedVoltage| {
+            let free = ForceResponse { acceleration: voltage.acceleration(system), displacement: 0.0 };
+            match &mut tangent {
+                Some(response) if free.acceleration.is_infinite() => response.of(about, &voltage.force),
+                _ => free,
+            }
+        };
+        voltages.iter().map(of).collect()
     }
 
     /// Number of voltages across gaps.
@@ -314,7 +319,7 @@ impl Multirate {
         };
         let Some(relative) = relative_errors((system, weights), &step, errors) else { return failed(step) };
         self.evaluate_forces(system, &step.motion.q);
-        let responses = self.responses(system, &step.motion.q, &step.sources);
+        let responses = self.responses((system, weights), &step.motion.q, &step.sources);
         self.set_push(step.extrapolations.iter().map(|square| square.line()));
         let longest = INTEGRATOR_STEPS * step.trial_step;
         let ramp = Ramp::new(&system.electrics, &step.sources, &step.sources, &[], longest)
@@ -355,20 +360,26 @@ impl Multirate {
         }
     }
 
-    /// Prediction of a macro step, from the cache or made again.
+    /// Prediction of a macro step, from the cache or made again, with the error bound ([`PredictedStep::error_bound`]) at a time (s) after its start, where
+    /// sources have some values and squared voltages some integrals.
     pub(crate) fn predicted(
         &mut self,
         about: (&System, &NormWeights),
-        step: &Arc<MacroStep>,
+        (step, elapsed, integrals): (&Arc<MacroStep>, f64, &[SquareIntegrals]),
+        sources: &[f64],
         errors: ErrorBudget,
-    ) -> &PredictedStep {
-        match self.cache.iter().position(|known| known.step.start == step.start) {
-            Some(place) => &self.cache[place],
-            None => {
-                let predicted = self.predict(about, Arc::clone(step), errors);
-                self.store(predicted)
-            }
-        }
+    ) -> (&PredictedStep, f64) {
+        let place = self.cache.iter().position(|known| known.step.start == step.start).unwrap_or_else(|| {
+            let predicted = self.predict(about, Arc::clone(step), errors);
+            self.store(predicted);
+            self.cache.len() - 1
+        });
+        let (predicted, voltages) = (&self.cache[place], &self.voltages);
+        let change = |k: usize| {
+            let [now, start] = [sources, &step.sources].map(|sources| voltages[k].volts(sources).powi(2));
+            now - start
+        };
+        (predicted, predicted.error_bound(elapsed, integrals, &change))
     }
 
     fn store(&mut self, predicted: PredictedStep) -> &PredictedStep {
@@ -522,15 +533,20 @@ impl PredictedStep {
         }
     }
 
-    /// Bound of the errors of displacements and rates at a time (s) after the start, relative to the allowed ones; `changes` are those of the squares since
-    /// then (V²).
-    pub(crate) fn error_bound(&self, elapsed: f64, integrals: &[SquareIntegrals], changes: &[f64]) -> f64 {
+    /// Bound of the errors of displacements and rates at a time (s) after the start, relative to the allowed ones; `change` is that of the square of a voltage
+    /// since then (V²).
+    fn error_bound(&self, elapsed: f64, integrals: &[SquareIntegrals], change: &dyn Fn(usize) -> f64) -> f64 {
         let mut errors = [0.0; 3];
-        let squares = self.step.extrapolations.iter().zip(integrals).zip(changes);
-        for (((square, integrals), change), response) in squares.zip(&self.responses) {
+        let squares = self.step.extrapolations.iter().zip(integrals).zip(&self.responses);
+        for (k, ((square, integrals), response)) in squares.enumerate() {
             let [rate, displacement] = square.residual(*integrals, elapsed).map(|x| x.abs() * response.acceleration);
-            let [value, slope] = square.line();
-            let follows = (change - value - slope * elapsed).abs() * response.displacement;
+            let follows = match response.displacement {
+                0.0 => 0.0,
+                by_square => {
+                    let [value, slope] = square.line();
+                    (change(k) - value - slope * elapsed).abs() * by_square
+                }
+            };
             errors.iter_mut().zip([displacement, rate, follows]).for_each(|(sum, error)| *sum += error);
         }
         // zero stays zero where the allowed error is zero

@@ -88,7 +88,6 @@ impl SessionReduction {
     ) -> Result<Option<Self>, String> {
         match (compiled.requested.formulation, compiled.options.formulation) {
             (_, Formulation::Reduced) => Self::trained(compiled, system, ports, times, known).map(Some),
-            // the steps of others are far longer than the training
             (Formulation::Auto, Formulation::Auto | Formulation::Compliant) if compiled.options.ranges.is_some() => {
                 let found = Self::trained(compiled, system, ports, times, known).ok();
                 Ok(found.filter(|found| CHEAPER * found.model.space.size() <= system.model.unknowns()))

@@ -5,7 +5,7 @@
 //! e(t) = Σ |M⁻¹·½·∇C| · |∬ ΔV² dt²|
 //! ```
 //! in the norm of masses: elastic forces only reduce it. Directions without mass follow their springs at once; what these pass on to masses is part of e
-//! ([`crate::free_response`]), and so is their own displacement by ΔV². A trial interpolates q(t) if
+//! ([`crate::condensed_response`]), and so is their own displacement by ΔV². A trial interpolates q(t) if
 //!
 //! * every body has its own coordinates, or the model is reduced, and there is no thermal agitation;
 //! * no heater, floating conductor or input other than voltages exists;
@@ -66,10 +66,10 @@ impl DeviceSession {
     ) -> Option<(f64, Box<MacroStepPosition>)> {
         let (about, dt) = ((system, &self.weights), request.dt);
         let continued = parent.macro_step.as_deref().filter(|position| {
-            let changes = multirate.changes(&position.step, &parent.sources);
-            let predicted = multirate.predicted(about, &position.step, errors);
+            let at = (&position.step, position.elapsed, &position.integrals[..]);
+            let (predicted, bound) = multirate.predicted(about, at, &parent.sources, errors);
             let fits = predicted.ends.is_some_and(|([_, length], _)| position.elapsed + dt <= length);
-            fits && predicted.error_bound(position.elapsed, &position.integrals, &changes) <= 0.5
+            fits && bound <= 0.5
         });
         let MacroStepPosition { step, elapsed, points, mut integrals } = match continued {
             Some(position) => position.clone(),
@@ -82,10 +82,10 @@ impl DeviceSession {
             }
         };
         multirate.extend(&step, &mut integrals, dt, [&parent.sources, &self.sources]);
-        let (elapsed, changes) = (elapsed + dt, multirate.changes(&step, &self.sources));
-        let predicted = multirate.predicted(about, &step, errors);
+        let elapsed = elapsed + dt;
+        let (predicted, bound) = multirate.predicted(about, (&step, elapsed, &integrals), &self.sources, errors);
         let (ends, next_step) = predicted.ends?;
-        self.exceeds_bound = predicted.error_bound(elapsed, &integrals, &changes) > 1.0;
+        self.exceeds_bound = bound > 1.0;
         // the integrator reports points that are too short for its arithmetic
         if self.exceeds_bound || dt < f64::EPSILON * ends[1] {
             return None;

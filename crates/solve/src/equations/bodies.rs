@@ -55,6 +55,18 @@ impl NormWeights {
         (self.mass > 0.0 && self.dragged.is_empty()).then(|| system.model.mass_product(q, q).sqrt())
     }
 
+    /// Norm of displacements of directions without inertia (√kg·m): they weigh as much as the mean of the bodies, rotations at the length scale.
+    pub fn norm_without_mass(&self, system: &System, q: &[Pose]) -> f64 {
+        let turned = |q: &Pose| (q.z * system.length_scale).powi(2);
+        let squared = |(j, q): (usize, &Pose)| match system.model.mass(j) {
+            m if m.x == 0.0 => q.x * q.x + q.y * q.y + turned(q),
+            m if m.z == 0.0 => turned(q),
+            _ => 0.0,
+        };
+        let sum: f64 = q.iter().enumerate().map(squared).sum();
+        (sum * self.mass / q.len() as f64).sqrt()
+    }
+
     fn allowed_of_norms(&self, system: &System, [before, after]: [f64; 2], tol: f64) -> f64 {
         ErrorBudget::of(tol).within(error_scale([before, after], [system.length_scale, self.mass.sqrt()]))
     }
@@ -81,20 +93,12 @@ impl<'a> Bodies<'a> {
     /// Part that a motion between two ends leaves out where a change of the sources is linear in it, over the error that a step of length `h` (s) may have.
     /// Of the motion it is half of the change, as forces are quadratic in the sources; of contact the change times that of the penetration, as forces go with the
     /// third power.
-    /// Directions without inertia follow at once and weigh as much as the mean of the bodies, rotations at the length scale. Infinite where nothing has mass.
+    /// Directions without inertia follow at once ([`NormWeights::norm_without_mass`]). Infinite where nothing has mass.
     pub fn left_out(&self, ends: [&Motion; 2], change: &Motion, h: f64, tol: f64) -> f64 {
-        let (bodies, mass) = (&self.system.model.bodies, self.weights.mass);
-        let Some(([q, v], may)) = self.of_masses(ends, Some(change), h, tol).filter(|_| mass > 0.0) else {
+        let Some(([q, v], may)) = self.of_masses(ends, Some(change), h, tol).filter(|_| self.weights.mass > 0.0) else {
             return f64::INFINITY;
         };
-        let turned = |q: &Pose| (q.z * self.system.length_scale).powi(2);
-        let follows = |(j, q): (usize, &Pose)| match self.system.model.mass(j) {
-            m if m.x == 0.0 => q.x * q.x + q.y * q.y + turned(q),
-            m if m.z == 0.0 => turned(q),
-            _ => 0.0,
-        };
-        let follows: f64 = change.q.iter().enumerate().map(follows).sum();
-        let q = q.hypot((follows * mass / bodies.len() as f64).sqrt());
+        let q = q.hypot(self.weights.norm_without_mass(self.system, &change.q));
         let moved = relative_error([q, v], h, may, 0.0);
         let contact = contact_error(self.system, ends.into(), change, tol);
         if contact == 0.0 {

@@ -1,4 +1,5 @@
-//! The response of the bodies to a force that acts for a short time: masses accelerate, directions without mass follow their springs at once.
+//! The response of the bodies to a force that acts for a short time, by static condensation: masses accelerate, directions without mass follow their springs at
+//! once.
 //!
 //! With γ far below the shortest time in which something moves,
 //! ```text
@@ -9,13 +10,14 @@
 use bimorph_domains::{Drive, System};
 use bimorph_multibody::planar::Pose;
 use bimorph_multibody::{BodyMatrix, forces};
+use bimorph_solve::equations::bodies::NormWeights;
 
 /// γ over the shortest time (1).
 const SHORT: f64 = 1e-3;
 
 /// Storage.
 #[derive(Debug)]
-pub(crate) struct FreeResponse {
+pub(crate) struct CondensedResponse {
     matrix: BodyMatrix,
     residual: Vec<Pose>,
     x: Vec<Pose>,
@@ -28,11 +30,11 @@ pub(crate) struct FreeResponse {
 pub(crate) struct ForceResponse {
     /// Acceleration (√kg·m/s²).
     pub(crate) acceleration: f64,
-    /// Displacement of directions without mass, each of which counts as the mean of the bodies, rotations at the length scale (√kg·m).
+    /// Displacement of directions without mass, see [`NormWeights::norm_without_mass`] (√kg·m).
     pub(crate) displacement: f64,
 }
 
-impl FreeResponse {
+impl CondensedResponse {
     /// Storage for a system in which nothing moves in less than about `shortest` (s).
     pub(crate) fn new(system: &System, shortest: f64) -> Self {
         let zeros = vec![Pose::zeros(); system.bodies()];
@@ -54,26 +56,15 @@ impl FreeResponse {
     }
 
     /// The response to a force on each body (N, N·m), with the tangent taken before.
-    pub(crate) fn of(&mut self, system: &System, force: &[Pose]) -> ForceResponse {
+    pub(crate) fn of(&mut self, (system, weights): (&System, &NormWeights), force: &[Pose]) -> ForceResponse {
         let Self { matrix, x, gamma, .. } = self;
         let model = &system.model;
         x.copy_from_slice(force);
         model.project(x);
         matrix.solve(&model.pattern, x);
-        let (mut mass, mut follows) = (0.0, 0.0);
-        for (j, x) in x.iter().enumerate() {
-            let m = model.mass(j);
-            let turned = (x.z * system.length_scale).powi(2);
-            match m {
-                m if m.x == 0.0 => follows += x.x * x.x + x.y * x.y + turned,
-                m if m.z == 0.0 => follows += turned,
-                _ => {}
-            }
-            mass += m.x;
-        }
         ForceResponse {
             acceleration: model.mass_product(x, x).sqrt() / (*gamma * *gamma),
-            displacement: (follows * mass / x.len() as f64).sqrt(),
+            displacement: weights.norm_without_mass(system, x),
         }
     }
 }
@@ -99,13 +90,13 @@ mod tests {
     /// The response to a force on the heaviest body, which is the inner one.
     fn of_inner(system: &System, shortest: f64, force: Pose) -> ForceResponse {
         let n = system.bodies();
-        let mut response = FreeResponse::new(system, shortest);
+        let mut response = CondensedResponse::new(system, shortest);
         assert!(response.begin(system, &vec![Pose::zeros(); n], &system.electrics.drive()));
         let mut forces = vec![Pose::zeros(); n];
         let inner = (0..n).max_by(|a, b| system.model.mass(*a).x.total_cmp(&system.model.mass(*b).x)).unwrap();
         assert_eq!(system.model.mass(inner).z, 0.0);
         forces[inner] = force;
-        response.of(system, &forces)
+        response.of((system, &NormWeights::new(&system.model)), &forces)
     }
 
     fn same(found: f64, expected: f64) {
