@@ -150,6 +150,79 @@ fn errors_of_a_body_that_swings_far() {
     }
 }
 
+/// Plates on flexures in a chain that is held at its end.
+const HELD_CHAIN: &str = "
+    process p1 = [Youngsmodulus=165e9 density=2300 h=1.63u]
+    anchor p1 [a] []
+    beam2d p1 [a r] [l=8.98u w=0.967u oz=0.042]
+    link2d * [r c] [l=65.75u oz=0.042]
+    plate2d p1 [c] [l=131.5u w=81.6u oz=0.042]
+    link2d * [c q] [l=65.75u oz=0.042]
+    beam2d p1 [q s] [l=21.2u w=1u oz=-0.182]
+    link2d * [s d] [l=65.2u oz=-0.182]
+    plate2d p1 [d] [l=130.4u w=138u oz=-0.182]
+    link2d * [d t] [l=65.2u oz=-0.182]
+    beam2d p1 [t u] [l=83.7u w=1.42u oz=-0.03]
+    link2d * [u e] [l=50.33u oz=-0.03]
+    plate2d p1 [e] [l=100.7u w=126u oz=-0.03]
+    link2d * [e v] [l=50.33u oz=-0.03]
+    beam2d p1 [v w] [l=14.3u w=1.33u oz=-0.072]
+    link2d * [w m] [l=75.5u oz=-0.072]
+    plate2d p1 [m] [l=151u w=71u oz=-0.072]
+    link2d * [m x] [l=75.5u oz=-0.072]
+    beam2d p1 [x y] [l=48.1u w=1.06u oz=-1.378]
+    anchor p1 [y] []
+    f2d * [m] [F=2.889u oz=5.345]";
+
+/// A tree of beams with plates at its ends, the slender ones of which swing fast.
+const SLENDER_BRANCHES: &str = "
+    process p1 = [Youngsmodulus=165e9 density=2300 h=4.15u]
+    anchor p1 [a] []
+    beam2d p1 [a n] [l=52.78u w=1.93u oz=-0.7758]
+    beam2d p1 [n b] [l=75.24u w=0.504u oz=-2.6033]
+    beam2d p1 [n c] [l=95.87u w=0.572u oz=1.4826]
+    beam2d p1 [n m] [l=62.85u w=3.84u oz=1.1410]
+    plate2d p1 [b] [l=16u w=16u]
+    plate2d p1 [c] [l=28.8u w=28.8u]
+    plate2d p1 [m] [l=22u w=22u]
+    f2d * [m] [F=3.763u oz=0.361]";
+
+/// No more runs are made than the error asks for, and it is within the tolerance. Steps of the chain at 1e-2 do not resolve it, and the next ones have a tenth of the
+/// tolerance, where a hundredth takes 1,634 steps. The energy that those of the branches take is 4e-3 of that of the motion, and most of it does not matter: a run
+/// of ten times the tolerance is compared, none is made at a tenth (10,867 steps). Against Radau IIA at a hundredth of the tolerance.
+#[test]
+fn no_more_runs_than_the_error_asks_for() {
+    for (text, segments, (tol, stop), want) in [
+        (HELD_CHAIN, 2, (1e-2, 186.5e-6), [1e-2, 1e-3]),
+        (SLENDER_BRANCHES, 8, (1e-3, 305e-6), [1e-3, 1e-2]),
+    ] {
+        let undamped = CompileOptions { segments: Some(segments), undamped: true, ..CompileOptions::default() };
+        let compiled = model(text, &CompileOptions { formulation: Formulation::Compliant, ..undamped });
+        let options = TransientOptions {
+            stop,
+            signals: vec!["m.x".into(), "m.y".into()],
+            points: 101,
+            tol,
+            ..TransientOptions::default()
+        };
+        let exact = TransientOptions { tol: 1e-2 * tol, method: Integrator::Radau5, ..options.clone() };
+        let exact = transient(&compiled, &exact, &mut |_, _| (), &mut |_| true).unwrap();
+        let mut tolerances = Vec::new();
+        let mut run = |options: &TransientOptions<'_>,
+                       sample: &mut dyn FnMut(f64, &[f64]),
+                       watch: &mut dyn FnMut(f64) -> bool| {
+            tolerances.push(options.tol);
+            transient(&compiled, options, sample, watch).map(|r| (r, ()))
+        };
+        let found = with_step_error(&options, &compiled, &mut run, &mut |_, _| (), &mut |_| true).unwrap().0;
+        let error = largest_error(&found, &exact, &|_| 0.0);
+        println!("{error:.2e}, reported {:.2e}, {} steps", found.step_error.unwrap(), found.counters.steps);
+        let same = tolerances.iter().zip(want).all(|(tol, want)| (tol / want - 1.0_f64).abs() < 1e-9);
+        assert!(same && tolerances.len() == want.len(), "{tolerances:?}");
+        assert!(error <= tol && found.step_error.unwrap() <= tol, "{error:e}");
+    }
+}
+
 fn bimorph() -> (Bundle, CompileOptions) {
     let path = format!("{}/examples/single_bimorph/single_bimorph.net", env!("CARGO_MANIFEST_DIR"));
     let set = vec![("F".to_owned(), bimorph::netlist::Setting::Number(20e-6))];

@@ -4,17 +4,23 @@
 //! carries the error of its motion along (`bimorph_solve::time::defect`), and reports the root mean square error of the worst signal, of its
 //! amplitude. A run whose error is beyond what the mesh leaves of the tolerance is made again at
 //! ```text
-//! t₂ = t₁·min(max((0.7·room/e₁)^(1/q), 0.01), 0.7)
+//! t₂ = t₁·min(max((0.7·room/e₁)^(1/q), r), 0.7)
 //! ```
 //! with q = 0.6 at first, and then as the two runs before say, within 0.35 and 1: ever higher modes carry the error, so it falls by less
-//! than in proportion to the tolerance. There are five runs at most, none of which takes more than some seconds; the samples of a run that
+//! than in proportion to the tolerance. An error above 0.1 is that of steps that do not resolve a motion. It falls faster than any power once they do, and r is
+//! 0.1 there, else 0.01. There are five runs at most, none of which takes more than some seconds; the samples of a run that
 //! does are sent as they come, and it is not made again.
 //!
 //! A propagated error may grow where that of the motion does not: the Jacobian of a step is that at its start. Where it says that nothing is predictable,
 //! the run is compared as those without it, and is predictable if the comparison says so.
 //!
 //! Nor does a propagated error see what steps take from a motion that turns fast ones with it. Where half of the energy that they took, of what
-//! moves, is beyond what the mesh leaves of the tolerance, the run is compared as well, and the larger of both errors is its error.
+//! moves, is beyond what the mesh leaves of the tolerance, the run is compared as well, and the larger of both errors is its error. The run before it is its
+//! companion if there is one. The part of the energy that matters to the signals is taken to be that of the companion, so that the error is at most
+//! ```text
+//! d₁·min(D/min(d₂, 1), 1)
+//! ```
+//! with D the difference of both, and d₁ and d₂ half of what the steps of the run and of its companion took.
 //!
 //! Runs without such an estimate are compared with a companion run (`companion.rs`). These are other methods, equal
 //! steps, rotating frames, and models whose parts may touch, where the error is propagated up to the first contact
@@ -34,7 +40,7 @@ use crate::reduced::Directions;
 use bimorph_base::ErrorBudget;
 use bimorph_model::compile::CompiledModel;
 use bimorph_model::options::Formulation;
-use companion::{EstimatedRun, companion, compared, is_made_again, with_companion};
+use companion::{EstimatedRun, LooserRun, companion, compared, is_made_again, picked_of, with_companion};
 pub use run::RunFunction;
 use run::{AT_THE_END, MAX_AGAIN};
 pub use run::{beyond, unknown};
@@ -50,6 +56,10 @@ const STEPS: f64 = 0.25;
 const COMPANION_STEPS: f64 = 0.56;
 /// Least and largest ratio of the tolerances of two runs.
 const RATIOS: (f64, f64) = (0.01, 0.7);
+/// Error from which on steps do not resolve a motion (1), and the least ratio of the tolerances of such a run and the next one: there errors fall much faster
+/// than any power that runs which resolve it have.
+const UNRESOLVED: f64 = 0.1;
+const UNRESOLVED_RATIO: f64 = 0.1;
 /// Runs at most.
 const RUNS: usize = 5;
 /// Error of two runs from which on a third is not made (1): nothing seems predictable.
@@ -99,7 +109,7 @@ fn held<T>(
         Some(_) if !made.long => {
             let (options, picked) =
                 (options.with_tolerance(made.steps.requested()), SelectedSamples::of(options, &made.kept));
-            Some(with_companion(&options, model, (&made.result, picked), run, watch)?)
+            Some(with_companion(&options, model, (&made.result, picked, made.before.take()), run, watch)?)
         }
         _ => None,
     };
@@ -188,6 +198,8 @@ struct SampledRun<T> {
     steps: ErrorBudget,
     /// Its samples have been sent.
     long: bool,
+    /// The run that it follows.
+    before: Option<LooserRun>,
 }
 
 /// The first run. Its samples are kept, since it may be made again, until it takes more than some seconds.
@@ -221,7 +233,7 @@ fn first<T>(
     };
     let (mut result, more) = run(options, &mut keep, &mut count)?;
     result.step_error = result.step_error.filter(|_| resolved(&picked, &result, options, model));
-    Ok(SampledRun { result, more, kept, steps: options.errors(), long: long.get() })
+    Ok(SampledRun { result, more, kept, steps: options.errors(), long: long.get(), before: None })
 }
 
 /// Runs at sharper tolerances until one is within what its mesh leaves of the tolerance of `options`.
@@ -239,11 +251,11 @@ fn sharper<T>(
     let unknowns = model.unknowns() as f64;
     let mut exponent = EXPONENT;
     for _ in 1..RUNS {
-        let ratio = match made.result.step_error {
-            Some(error) if error > room && !made.long => ErrorBudget::of(room).aim(error).powf(1.0 / exponent),
+        let error = match made.result.step_error {
+            Some(error) if error > room && !made.long => error,
             _ => break,
         };
-        let ratio = ratio.clamp(RATIOS.0, RATIOS.1);
+        let ratio = next_ratio(ErrorBudget::of(room).aim(error).powf(1.0 / exponent), error);
         // the length of a step goes with the fourth root of its tolerance
         if made.result.counters.steps as f64 * ratio.powf(-STEPS) * unknowns > MAX_AGAIN {
             break;
@@ -261,7 +273,9 @@ fn sharper<T>(
         };
         result.step_error = result.step_error.filter(|_| resolved(&picked, &result, &options, model));
         let errors = made.result.step_error.zip(result.step_error);
-        made = SampledRun { result, more, kept, steps: options.errors(), long: false };
+        let before =
+            LooserRun { picked: picked_of(SelectedSamples::of(&options, &made.kept), &made.result), steps: made.steps };
+        made = SampledRun { result, more, kept, steps: options.errors(), long: false, before: Some(before) };
         if let Some((before, after)) = errors {
             exponent = ((before / after).ln() / -ratio.ln()).clamp(EXPONENTS.0, EXPONENTS.1);
             if before.min(after) > HOPELESS {
@@ -270,6 +284,11 @@ fn sharper<T>(
         }
     }
     Ok(made)
+}
+
+/// Ratio of the tolerance of the next run to that of one with this error (1), from the one that would mend it.
+fn next_ratio(mends: f64, error: f64) -> f64 {
+    mends.clamp(if error > UNRESOLVED { UNRESOLVED_RATIO } else { RATIOS.0 }, RATIOS.1)
 }
 
 /// Work of the runs that a run at this tolerance is made of, from the work of a coarse one that chooses its mesh ([`ErrorBudget::mesh_run`]), the error of
@@ -282,10 +301,11 @@ pub(super) fn predicted_work(coarse: f64, [error, damped]: [f64; 2], errors: Err
         total += last;
         let left = ratio * error;
         if errors.holds(left) || run == RUNS || last > MAX_AGAIN {
-            let compared = ratio * damped > errors.requested().max(left);
+            // a run before this one is its companion
+            let compared = run == 1 && ratio * damped > errors.requested().max(left);
             return total + if compared { last * COMPANION_STEPS } else { 0.0 };
         }
-        ratio *= errors.aim(left).clamp(RATIOS.0, RATIOS.1);
+        ratio *= next_ratio(errors.aim(left), left);
     }
     total
 }

@@ -95,22 +95,38 @@ pub(super) fn sharper<T>(
     Ok((made.result, made.more, now.requested()))
 }
 
-/// The companion of a run that has been made.
+/// A run that has been made and propagates its error, with its companion: the one `before`, if that is looser enough, or one that is made.
 ///
 /// # Errors
 /// [`AnalysisError::Cancelled`].
 pub(super) fn with_companion<T>(
     options: &TransientOptions<'_>,
     model: &CompiledModel,
-    (result, picked): (&TransientResult, SelectedSamples),
+    (result, picked, before): (&TransientResult, SelectedSamples, Option<LooserRun>),
     run: RunFunction<'_, T>,
     watch: ProgressCallback<'_>,
 ) -> Result<ComparedRun, AnalysisError> {
-    let first = companion(options, model.unknowns(), run, watch)?;
+    let (steps, first) = match before.filter(|before| options.errors().has_as_companion(before.steps)) {
+        Some(before) => (before.steps, (Some(before.picked), true)),
+        None => {
+            let first = companion(&options.with_estimate(), model.unknowns(), run, watch)?;
+            (ErrorBudget::of(options.errors().companion()), first)
+        }
+    };
     let resolved = options.step.is_some() || resolved(&picked, result, options, model);
     let picked = picked_of(picked, result);
-    let error = difference(options, model, (result, &picked), &first, resolved);
+    let damped = result.damped.zip(first.0.as_ref().and_then(|companion| companion.damped));
+    let error = difference(options, model, (result, &picked), &first, resolved).map(|apart| {
+        let reported = fraction(options, model, result, steps) * apart;
+        damped.map_or(reported, |(own, of_companion)| reported.min(by_damping(own, of_companion, apart)))
+    });
     Ok(ComparedRun { error, picked, is_made_again: is_made_again(options, model, &first) })
+}
+
+/// Change of the amplitude by the energy that the steps of a run took, if the part of it that matters to the signals is that of its companion, from which
+/// they are so far `apart` (1). No more than all of an amplitude is lost.
+fn by_damping(own: f64, of_companion: f64, apart: f64) -> f64 {
+    own * (apart / of_companion.min(1.0)).min(1.0)
 }
 
 /// Whether a run with this companion is made again where its error is too large: the samples of a long run are sent as they come.
@@ -147,6 +163,13 @@ impl<T> EstimatedRun<T> {
     }
 }
 
+/// A run at a looser tolerance that has been made.
+pub(super) struct LooserRun {
+    /// Its samples that are compared.
+    pub(super) picked: TransientResult,
+    pub(super) steps: ErrorBudget,
+}
+
 /// A comparison of a run that has been made.
 pub(super) struct ComparedRun {
     /// The error by the companion (1); none where they cannot be compared.
@@ -181,7 +204,10 @@ fn once<T>(
     let contact = first_contact(&result);
     let companion = (companion, whole);
     match difference(options, model, (&result, &picked), &companion, resolved) {
-        Some(error) => result.step_error = Some(error),
+        Some(apart) => {
+            let looser = ErrorBudget::of(options.errors().companion());
+            result.step_error = Some(fraction(options, model, &result, looser) * apart);
+        }
         None => result.warnings.extend((!options.signals.is_empty()).then(|| unknown(options))),
     }
     let (companion, _) = companion;
@@ -195,17 +221,18 @@ fn once<T>(
 }
 
 /// The samples of a run that are compared, as a result.
-fn picked_of(picked: SelectedSamples, result: &TransientResult) -> TransientResult {
+pub(super) fn picked_of(picked: SelectedSamples, result: &TransientResult) -> TransientResult {
     TransientResult {
         signals: picked.signals(&result.signals),
         counters: result.counters,
         directions: result.directions.clone(),
         events: result.events.clone(),
+        damped: result.damped,
         ..TransientResult::default()
     }
 }
 
-/// The error of a run by the difference to its companion, which may have come to its end (1); none where they cannot be compared.
+/// The difference of a run to its companion, which may have come to its end (1); none where they cannot be compared.
 fn difference(
     options: &TransientOptions<'_>,
     model: &CompiledModel,
@@ -232,21 +259,25 @@ fn difference(
         true => 1.0,
         false => ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64,
     };
-    let (_, method) = formulation::of_run(model, options);
-    let reported = match &result.directions {
-        Some(_) => SHARE_OF_REDUCED,
-        None => reported_fraction(options, method),
-    };
-    Some(reported * apart / share.min(1.0))
+    Some(apart / share.min(1.0))
 }
 
-/// Fraction of the difference that is reported. Of a companion that is hardly looser it is more than all, since the error is at best
-/// in proportion to the tolerance.
-fn reported_fraction(options: &TransientOptions<'_>, method: Integrator) -> f64 {
+/// Fraction of the difference to a companion whose steps follow `looser` that is reported. Of a companion that is hardly looser it is more than all, since
+/// the error is at best in proportion to the tolerance.
+fn fraction(
+    options: &TransientOptions<'_>,
+    model: &CompiledModel,
+    result: &TransientResult,
+    looser: ErrorBudget,
+) -> f64 {
+    if result.directions.is_some() {
+        return SHARE_OF_REDUCED;
+    }
+    let (_, method) = formulation::of_run(model, options);
     let share = if is_high(method) { REPORTED_FRACTION } else { SHARE_OF_SECOND };
     match options.step {
         Some(_) => REPORTED_FRACTION,
-        None => share.max(options.errors().of_companion_difference()),
+        None => share.max(options.errors().of_difference_to(looser)),
     }
 }
 
@@ -293,6 +324,7 @@ pub(super) fn companion<T>(
     let ended = run(&looser, &mut keep, &mut few);
     let counters = ended.as_ref().map_or_else(|_| Default::default(), |(result, _)| result.counters);
     let directions = ended.as_ref().ok().and_then(|(result, _)| result.directions.clone());
+    let damped = ended.as_ref().ok().and_then(|(result, _)| result.damped);
     let events = ended.as_ref().map_or_else(|_| Vec::new(), |(result, _)| result.events.clone());
     if stopped {
         return Err(AnalysisError::Cancelled);
@@ -307,6 +339,7 @@ pub(super) fn companion<T>(
                     counters,
                     directions,
                     events,
+                    damped,
                     ..TransientResult::default()
                 }),
                 whole,
