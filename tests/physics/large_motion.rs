@@ -1,7 +1,7 @@
 //! A run with changing stiffness holds the tolerance of its mesh, or reports an error beyond it: contracts of
 //! `analysis::mesh` for transients.
 
-use bimorph::analysis::chart::error::relative_error;
+use bimorph::analysis::chart::error::{largest_error, relative_error};
 use bimorph::analysis::mesh::{MeshRequest, fitted, fitted_in_time};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
@@ -139,4 +139,54 @@ f2d * [s] [F=60u oz=pi/2]
             );
         }
     }
+}
+
+/// Seven plates on flexures between anchors, which a force turns by a third of a radian.
+fn stretched_chain() -> String {
+    // length and width of a flexure, and of its plate (µm), and their direction (rad)
+    let parts = [
+        [21.4, 0.7874, 28.74, 11.33, -0.401],
+        [18.12, 0.5843, 36.56, 28.25, 0.3],
+        [7.612, 0.6648, 27.64, 22.48, -0.312],
+        [17.28, 0.6599, 46.76, 26.16, 0.01],
+        [13.36, 0.5576, 30.39, 23.9, 0.332],
+        [5.321, 0.6777, 20.01, 21.02, -0.085],
+        [10.82, 0.9329, 42.09, 24.86, -0.385],
+    ];
+    let mut text = "process p = [Youngsmodulus=165e9 density=2300 h=3.04u]\nanchor p [q(0)] []\n".to_owned();
+    for (k, [l, w, length, width, oz]) in (1..).zip(parts) {
+        let half = length / 2.0;
+        text += &format!(
+            "beam2d p [q({}) r({k})] [l={l}u w={w}u oz={oz}]\nlink2d * [r({k}) c({k})] [l={half}u oz={oz}]\n\
+             plate2d p [c({k})] [l={length}u w={width}u oz={oz}]\nlink2d * [c({k}) q({k})] [l={half}u oz={oz}]\n",
+            k - 1
+        );
+    }
+    text + "beam2d p [q(7) b] [l=21.36u w=0.7117u oz=-0.15]\nanchor p [b] []\nf2d * [c(7)] [F=44.56u oz=3.604]\n"
+}
+
+/// Meshes that differ by their steps alone are compared with sharper steps. The steps of this chain at the tolerance differ by as much on 16 segments as on 256. It has
+/// at most 16, and the error of this mesh is within its estimate: against four times the segments, both with steps at a hundredth of the tolerance.
+#[test]
+fn steps_are_no_error_of_a_mesh() {
+    let text = stretched_chain();
+    let model = |segments| {
+        let given = CompileOptions { tol: 1e-2, segments, undamped: true, ..CompileOptions::default() };
+        compile(&Bundle::from_text("chain.net", &text), &given).unwrap()
+    };
+    let options = TransientOptions {
+        stop: 156.6e-6,
+        points: 101,
+        signals: vec!["c(7).x".into(), "c(7).y".into()],
+        tol: 1e-2,
+        ..TransientOptions::default()
+    };
+    let (fitted, _) = fitted_in_time(&model(None), &options).unwrap();
+    let most = *fitted.order.segments.iter().max().unwrap();
+    let sharp = TransientOptions { tol: 1e-4, ..options.clone() };
+    let run = |model| transient(model, &sharp, &mut |_, _| {}, &mut |_| true).unwrap();
+    let error = largest_error(&run(&fitted), &run(&model(Some(4 * most))), &|_| 0.0);
+    let stated = fitted.order.estimated_error.unwrap();
+    println!("{most} segments, error {error:.1e}, stated {stated:.1e}");
+    assert!(most <= 16 && error <= stated && stated <= 1e-2, "{most} segments, error {error:e}, stated {stated:e}");
 }

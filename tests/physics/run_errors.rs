@@ -192,10 +192,9 @@ const SLENDER_BRANCHES: &str = "
 /// of ten times the tolerance is compared, none is made at a tenth (10,867 steps). Against Radau IIA at a hundredth of the tolerance.
 #[test]
 fn no_more_runs_than_the_error_asks_for() {
-    for (text, segments, (tol, stop), want) in [
-        (HELD_CHAIN, 2, (1e-2, 186.5e-6), [1e-2, 1e-3]),
-        (SLENDER_BRANCHES, 8, (1e-3, 305e-6), [1e-3, 1e-2]),
-    ] {
+    for (text, segments, (tol, stop), want) in
+        [(HELD_CHAIN, 2, (1e-2, 186.5e-6), [1e-2, 1e-3]), (SLENDER_BRANCHES, 8, (1e-3, 305e-6), [1e-3, 1e-2])]
+    {
         let undamped = CompileOptions { segments: Some(segments), undamped: true, ..CompileOptions::default() };
         let compiled = model(text, &CompileOptions { formulation: Formulation::Compliant, ..undamped });
         let options = TransientOptions {

@@ -45,6 +45,8 @@ impl ErrorBudget {
     const ESTIMATE_OF_STEPS: f64 = 0.85;
     /// Ratio of the tolerance of a companion run to that of the run.
     const COMPANION: f64 = 10.0;
+    /// The sharpest steps of a run that chooses a mesh, of the tolerance: about what the run itself needs whose first steps miss it by as much.
+    const STALLED_MESH_RUN: f64 = 0.03;
     /// Loosest tolerance of a companion run, and of a run that chooses a mesh.
     const LOOSEST: [f64; 2] = [0.3, 0.1];
     /// Least ratio of the tolerance of a companion run to that of the run: a nearer one takes much the same steps.
@@ -262,13 +264,14 @@ impl ErrorBudget {
     }
 
     /// The division for such runs again, whose steps had the division `before` and an error `own`: where their difference makes an error `found` of
-    /// the mesh that is too large, and steps may be the reason. Not beyond the requested tolerance.
+    /// the mesh that is too large, and steps may be the reason. Not beyond the requested tolerance, unless a finer mesh did not help: it `stalls`.
     #[must_use]
-    pub fn sharper_mesh_runs(self, before: Self, own: f64, found: f64) -> Option<Self> {
+    pub fn sharper_mesh_runs(self, before: Self, own: f64, (found, stalls): (f64, bool)) -> Option<Self> {
         let goal = self.large_motion();
-        let matters = found > goal && own > Self::OF_DIFFERENCE * found && before.requested > self.requested;
+        let least = if stalls { self.scaled(Self::STALLED_MESH_RUN) } else { self };
+        let matters = found > goal && own > Self::OF_DIFFERENCE * found && before.requested > least.requested;
         let aim = Self::of(Self::OF_DIFFERENCE * goal).aim(own);
-        matters.then(|| before.scaled(aim.min(1.0).powf(Self::PER_ERROR)).max(self))
+        matters.then(|| before.scaled(aim.min(1.0).powf(Self::PER_ERROR)).max(least))
     }
 
     fn max(self, least: Self) -> Self {

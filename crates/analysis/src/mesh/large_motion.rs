@@ -13,7 +13,8 @@
 //! than their means. Where the contact comes early in the run, meshes are compared in the time up to it (`to_first_contact.rs`).
 //!
 //! The first coarse run propagates the error of its steps. Steps that differ on both meshes are no error of a mesh. So where the difference is beyond the
-//! goal and this error may explain it, both runs are made again with sharper steps before segments are doubled. Where another formulation may be
+//! goal and this error may explain it, both runs are made again with sharper steps before segments are doubled: at the tolerance of the run at most, and sharper
+//! ones where doubled segments left the difference as it was. Where another formulation may be
 //! taken, a judge of the first coarse run ends the search ([`SearchLimits`]).
 //!
 //! If stiffness stays constant, but the motion outside the modes of the mesh exceeds the tolerance, only a bound could
@@ -52,6 +53,8 @@ const MAX_PASSES: usize = 6;
 /// Segments of all beams together, at most.
 const MAX_SEGMENTS: usize = 4000;
 const AIM: f64 = 0.7;
+/// Ratio of the differences of two pairs of meshes from which on segments do not reduce them.
+const STALLS: f64 = 0.7;
 /// The order of convergence until it is measured, and the highest accepted one. Stretching has 2; among coarse meshes
 /// and near buckling the measured order is lower, or seems higher.
 const ORDERS: (f64, f64) = (1.0, 2.0);
@@ -127,11 +130,16 @@ fn search(
         Mesh { segments: segments.to_vec(), estimated_error, ..order.clone() }
     };
     let SearchLimits { work: [first_work, mut work], judge } = limits;
-    let steps = moving.options.errors().mesh_runs();
-    let first = pair(moving, &order.segments)
-        .and_then(|(from, to)| Some((run_on(moving, options, &from, (steps, true), first_work)?, from, to)));
+    let errors = moving.options.errors();
+    let first = pair(moving, &order.segments).and_then(|(from, to)| {
+        // steps at a looser tolerance may fail where those of the run do not
+        let mut runs = [errors.mesh_runs(), errors].into_iter();
+        let (run, steps) =
+            runs.find_map(|steps| Some((run_on(moving, options, &from, (steps, true), first_work)?, steps)))?;
+        Some((run, steps, from, to))
+    });
     // a failure is reported when the run is made; a result without a comparison has no estimate
-    let Some((run, mut from, mut segments)) = first else {
+    let Some((run, steps, mut from, mut segments)) = first else {
         return Ok(SearchEnd::Found(on(&order.segments, None), None));
     };
     if run.is_beyond || run.steps.zip(judge).is_some_and(|(steps, goes_on)| !goes_on(&steps)) {
@@ -148,7 +156,7 @@ fn search(
     let mut last = SearchEnd::Found(on(&order.segments, None), None);
     for _ in 0..MAX_PASSES {
         let steps = coarse.steps;
-        let compared = coarse.compared(moving, options, [&from, &segments], convergence, &mut work);
+        let compared = coarse.compared(moving, options, [&from, &segments], (convergence, before), &mut work);
         let (difference, fine, of_fine) = match compared {
             Comparison::Made(difference, run) => (difference, run.samples, run.work),
             Comparison::Failed => break,
@@ -304,14 +312,14 @@ enum Comparison {
 }
 
 impl CoarseSamples {
-    /// Compares a mesh with the finer one, in at most so much `work`. Steps that differ on both meshes are no error of a mesh: where they may be the
-    /// difference, both runs are made again with sharper steps.
+    /// Compares a mesh with the finer one, in at most so much `work`; `before` is the difference of the meshes before. Steps that differ on both meshes are no
+    /// error of a mesh: where they may be the difference, both runs are made again with sharper steps.
     fn compared(
         &mut self,
         moving: &CompiledModel,
         options: &TransientOptions<'_>,
         [coarse, fine]: [&[usize]; 2],
-        convergence: f64,
+        (convergence, before): (f64, Option<f64>),
         work: &mut f64,
     ) -> Comparison {
         loop {
@@ -326,7 +334,8 @@ impl CoarseSamples {
                 return Comparison::Failed;
             };
             let error = difference / (convergence.exp2() - 1.0);
-            let sharper = self.error.and_then(|own| moving.options.errors().sharper_mesh_runs(self.steps, own, error));
+            let found = (error, before.is_some_and(|before| difference > STALLS * before));
+            let sharper = self.error.and_then(|own| moving.options.errors().sharper_mesh_runs(self.steps, own, found));
             let again = sharper.and_then(|steps| Some((run_on(moving, options, coarse, (steps, true), *work)?, steps)));
             let Some((again, steps)) = again else { return Comparison::Made(difference, run) };
             *work -= again.work;
