@@ -187,11 +187,11 @@ const SLENDER_BRANCHES: &str = "
     plate2d p1 [m] [l=22u w=22u]
     f2d * [m] [F=3.763u oz=0.361]";
 
-/// No more runs are made than the error asks for, and it is within the tolerance. Steps of the chain at 1e-2 do not resolve it, and the next ones have a tenth of the
+/// No more runs are made than the error requires, and it is within the tolerance. Steps of the chain at 1e-2 do not resolve it, and the next ones have a tenth of the
 /// tolerance, where a hundredth takes 1,634 steps. The energy that those of the branches take is 4e-3 of that of the motion, and most of it does not matter: a run
 /// of ten times the tolerance is compared, none is made at a tenth (10,867 steps). Against Radau IIA at a hundredth of the tolerance.
 #[test]
-fn no_more_runs_than_the_error_asks_for() {
+fn no_more_runs_than_the_error_requires() {
     for (text, segments, (tol, stop), want) in
         [(HELD_CHAIN, 2, (1e-2, 186.5e-6), [1e-2, 1e-3]), (SLENDER_BRANCHES, 8, (1e-3, 305e-6), [1e-3, 1e-2])]
     {

@@ -13,8 +13,8 @@
 //! than their means. Where the contact comes early in the run, meshes are compared in the time up to it (`to_first_contact.rs`).
 //!
 //! The first coarse run propagates the error of its steps. Steps that differ on both meshes are no error of a mesh. So where the difference is beyond the
-//! goal and this error may explain it, both runs are made again with sharper steps before segments are doubled: at the tolerance of the run at most, and sharper
-//! ones where doubled segments left the difference as it was. Where another formulation may be
+//! goal and this error may explain it, both runs are made again with sharper steps before segments are doubled. These are at the tolerance of the run at most, and
+//! sharper where doubled segments left the difference as it was. Where another formulation may be
 //! taken, a judge of the first coarse run ends the search ([`SearchLimits`]).
 //!
 //! If stiffness stays constant, but the motion outside the modes of the mesh exceeds the tolerance, only a bound could

@@ -348,3 +348,16 @@ pub(super) fn companion<T>(
         Err(_) => Ok((None, false)),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::by_damping;
+
+    /// Energy counts by the part of it that mattered to the companion, which is at most all of it, also where the companion lost none.
+    #[test]
+    fn energy_counts_by_what_its_companion_lost() {
+        assert_eq!(by_damping(0.1, 50.0, 0.02), 0.1 * 0.02);
+        assert_eq!(by_damping(0.02, 0.5, 0.25), 0.02 * 0.5);
+        assert_eq!([by_damping(0.02, 0.5, 0.7), by_damping(0.02, 0.0, 0.0), by_damping(0.02, 0.0, 0.1)], [0.02; 3]);
+    }
+}
