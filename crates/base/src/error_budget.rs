@@ -41,7 +41,7 @@ impl ErrorBudget {
     const RATES_WITHIN_STEP: f64 = 0.05;
     /// Least fraction of the tolerance that is left to the steps beside the mesh.
     const LEAST_FOR_STEPS: f64 = 0.35;
-    /// Fraction of that for their estimate: of 200 runs of random mechanisms the error was up to 1.2 times as large.
+    /// Fraction of that for their estimate: where it held the tolerance, in 200 runs of random mechanisms, the error was up to 1.2 times as large.
     const ESTIMATE_OF_STEPS: f64 = 0.85;
     /// Ratio of the tolerance of a companion run to that of the run.
     const COMPANION: f64 = 10.0;

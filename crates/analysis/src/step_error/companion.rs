@@ -123,8 +123,8 @@ pub(super) fn with_companion<T>(
     Ok(ComparedRun { error, picked, is_made_again: is_made_again(options, model, &first) })
 }
 
-/// Change of the amplitude by the energy that the steps of a run took, if the part of it that matters to the signals is that of its companion, from which
-/// they are so far `apart` (1). No more than all of an amplitude is lost.
+/// Change of the amplitude by the energy that the steps of a run took (1). The part of that energy that matters to the signals is taken to be that of the
+/// companion, from which they are so far `apart`. No more than all of an amplitude is lost.
 fn by_damping(own: f64, of_companion: f64, apart: f64) -> f64 {
     own * (apart / of_companion.min(1.0)).min(1.0)
 }
@@ -167,6 +167,7 @@ impl<T> EstimatedRun<T> {
 pub(super) struct LooserRun {
     /// Its samples that are compared.
     pub(super) picked: TransientResult,
+    /// The tolerance of its steps.
     pub(super) steps: ErrorBudget,
 }
 
