@@ -107,9 +107,8 @@ fn held<T>(
     let damped = made.result.damped.filter(|damped| *damped > room.max(found));
     let compared_run = match damped {
         Some(_) if !made.long => {
-            let (options, picked) =
-                (options.with_tolerance(made.steps.requested()), SelectedSamples::of(options, &made.kept));
-            Some(with_companion(&options, model, (&made.result, picked, made.before.take()), run, watch)?)
+            let options = options.with_tolerance(made.steps.requested());
+            Some(with_companion(&options, model, (&made.result, made.picked, made.before), run, watch)?)
         }
         _ => None,
     };
@@ -195,6 +194,8 @@ struct SampledRun<T> {
     result: TransientResult,
     more: T,
     kept: BufferedSamples,
+    /// The samples that are compared.
+    picked: SelectedSamples,
     steps: ErrorBudget,
     /// Its samples have been sent.
     long: bool,
@@ -233,7 +234,7 @@ fn first<T>(
     };
     let (mut result, more) = run(options, &mut keep, &mut count)?;
     result.step_error = result.step_error.filter(|_| resolved(&picked, &result, options, model));
-    Ok(SampledRun { result, more, kept, steps: options.errors(), long: long.get(), before: None })
+    Ok(SampledRun { result, more, kept, picked, steps: options.errors(), long: long.get(), before: None })
 }
 
 /// Runs at sharper tolerances until one is within what its mesh leaves of the tolerance of `options`.
@@ -247,7 +248,7 @@ fn sharper<T>(
     run: RunFunction<'_, T>,
     watch: ProgressCallback<'_>,
 ) -> Result<SampledRun<T>, AnalysisError> {
-    let room = options.errors().left_for_steps(made.result.estimated_error);
+    let room = options.errors().left_for_propagated(made.result.estimated_error);
     let unknowns = model.unknowns() as f64;
     let mut exponent = EXPONENT;
     for _ in 1..RUNS {
@@ -273,9 +274,8 @@ fn sharper<T>(
         };
         result.step_error = result.step_error.filter(|_| resolved(&picked, &result, &options, model));
         let errors = made.result.step_error.zip(result.step_error);
-        let before =
-            LooserRun { picked: picked_of(SelectedSamples::of(&options, &made.kept), &made.result), steps: made.steps };
-        made = SampledRun { result, more, kept, steps: options.errors(), long: false, before: Some(before) };
+        let before = LooserRun { picked: picked_of(made.picked, &made.result), steps: made.steps };
+        made = SampledRun { result, more, kept, picked, steps: options.errors(), long: false, before: Some(before) };
         if let Some((before, after)) = errors {
             exponent = ((before / after).ln() / -ratio.ln()).clamp(EXPONENTS.0, EXPONENTS.1);
             if before.min(after) > HOPELESS {

@@ -41,8 +41,8 @@ impl ErrorBudget {
     const RATES_WITHIN_STEP: f64 = 0.05;
     /// Least fraction of the tolerance that is left to the steps beside the mesh.
     const LEAST_FOR_STEPS: f64 = 0.35;
-    /// Fraction of that for their estimate: where it held the tolerance, in 200 runs of random mechanisms, the error was up to 1.2 times as large.
-    const ESTIMATE_OF_STEPS: f64 = 0.85;
+    /// Fraction of that for an error that a run propagates: where it held the tolerance, in 200 runs of random mechanisms, the true one was up to 1.2 times as large.
+    const PROPAGATED: f64 = 0.85;
     /// Ratio of the tolerance of a companion run to that of the run.
     const COMPANION: f64 = 10.0;
     /// The sharpest steps of a run that chooses a mesh, of the tolerance: about what the run itself needs whose first steps miss it by as much.
@@ -431,15 +431,20 @@ impl ErrorBudget {
         difference / (Self::COMPARISON * Self::COMPARISON * self.requested)
     }
 
-    /// For the estimate of the steps, beside a mesh with this error: the two are independent, so that their squares add.
+    /// For the steps, beside a mesh with this error: the two are independent, so that their squares add.
     pub fn left_for_steps(self, mesh: Option<f64>) -> f64 {
         match mesh {
             Some(mesh) if mesh <= self.requested => {
                 let part = mesh / self.requested;
-                Self::ESTIMATE_OF_STEPS * (1.0 - part * part).sqrt().max(Self::LEAST_FOR_STEPS) * self.requested
+                (1.0 - part * part).sqrt().max(Self::LEAST_FOR_STEPS) * self.requested
             }
-            _ => Self::ESTIMATE_OF_STEPS * self.requested,
+            _ => self.requested,
         }
+    }
+
+    /// The part of that for an error which a run propagates. A comparison of two runs needs no such reserve.
+    pub fn left_for_propagated(self, mesh: Option<f64>) -> f64 {
+        Self::PROPAGATED * self.left_for_steps(mesh)
     }
 }
 

@@ -71,13 +71,6 @@ impl SelectedSamples {
         Self { stride: stride(options), count: 0, columns: vec![Vec::new(); options.signals.len()] }
     }
 
-    /// Those of a run whose samples were kept.
-    pub(super) fn of(options: &TransientOptions<'_>, kept: &BufferedSamples) -> Self {
-        let mut picked = Self::new(options);
-        kept.send(&mut |_, values| picked.add(values));
-        picked
-    }
-
     pub(super) fn add(&mut self, values: &[f64]) {
         if self.count.is_multiple_of(self.stride) {
             bimorph_base::budget::lay_out(size_of_val(values));
