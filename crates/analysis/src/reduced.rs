@@ -239,7 +239,7 @@ pub fn reduced_transient(
     if let Some(corrections) = corrections {
         let MotionReduction { training, polynomials, .. } = reduction;
         let directions = Directions::Trained { training: Arc::clone(training), polynomials: *polynomials };
-        result.directions = Some(directions.after(&compiled.parts.system, &corrections));
+        result.directions = Some(directions.after(&compiled.parts.system, &corrections, compiled.options.errors()));
     }
     Ok(result)
 }

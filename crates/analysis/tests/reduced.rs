@@ -328,55 +328,87 @@ link2d * [c(7) q(7)] [l=8.13e-6 oz=0.914]
 f2d * [c(7)] [F=F oz=6.21]
 ";
 
+/// A plate on a flexure that is half as long as it.
+const PLATE: &str = "process p1 = [Youngsmodulus=165e9 density=2300 h=1.17e-6]
+param F=1u
+anchor p1 [a] []
+beam2d p1 [a b] [l=6.738e-6 w=1.321e-6 oz=-0.4863]
+link2d * [b c] [l=8.087e-6 oz=-0.4863]
+plate2d p1 [c] [l=1.617e-5 w=2.08e-5 oz=-0.4863]
+f2d * [c] [F=F oz=0.5572]
+";
+
+/// Plates under a force, or released from it, in time.
+struct PlateMotion {
+    text: &'static str,
+    force: f64,
+    release: bool,
+    node: &'static str,
+    stop: f64,
+}
+
+impl PlateMotion {
+    fn built(&self, formulation: Formulation, tol: f64, force: f64) -> CompiledModel {
+        let set = vec![("F".to_owned(), Setting::Number(force))];
+        let options =
+            CompileOptions { segments: Some(2), undamped: true, set, formulation, tol, ..CompileOptions::default() };
+        let bundle = Bundle::from_text("plates.net", self.text);
+        draw(&NetlistSource::new(&bundle), &options).and_then(|drawn| drawn.compile()).unwrap()
+    }
+
+    /// A run with the error of its steps; a model is reduced to 1e-2.
+    fn run(&self, formulation: Formulation, tol: f64) -> TransientResult {
+        let Self { force, release, node, stop, .. } = *self;
+        let start = self.built(Formulation::Compliant, 1e-2, force);
+        let moving = self.built(formulation, 1e-2, if release { 0.0 } else { force });
+        let options = TransientOptions {
+            stop,
+            signals: vec![format!("{node}.x"), format!("{node}.y")],
+            points: 101,
+            tol,
+            release: release.then_some(&start),
+            ..TransientOptions::default()
+        };
+        let mut run = |options: &TransientOptions<'_>,
+                       sample: &mut dyn FnMut(f64, &[f64]),
+                       watch: bimorph_analysis::ProgressCallback<'_>| {
+            Ok((transient(&moving, options, sample, watch)?, ()))
+        };
+        let mut sent = 0;
+        let mut count = |_: f64, _: &[f64]| sent += 1;
+        let (result, ()) = with_step_error(&options, &moving, &mut run, &mut count, &mut |_| true).unwrap();
+        assert_eq!(sent, options.points);
+        result
+    }
+
+    /// A run of the reduced model at 1e-2, whose signals are within it of those of the bodies at a hundredth of it.
+    fn confirmed(&self) -> (TransientResult, TransientResult) {
+        let (known, found) = (self.run(Formulation::Compliant, 1e-4), self.run(Formulation::Reduced, 1e-2));
+        for (known, signal) in known.signals.iter().zip(&found.signals) {
+            let error = difference(&signal.2, &known.2);
+            println!("{}: {error:.1e}, {:?} estimated, {} unknowns", signal.0, found.step_error, found.unknowns);
+            assert!(error <= 1e-2, "{}: {error:e}", signal.0);
+        }
+        assert!(found.step_error.is_some_and(|error| error <= 1e-2), "{:?}", found.step_error);
+        (known, found)
+    }
+}
+
 /// Trees of plates swing in modes that no load excites alone: runs of a reduced model are within the tolerance of the bodies' at a hundredth of it, by
 /// directions that the run before lacked, or by the full model. The directions of a training alone are off by 2.5e-2 and 9.6e-2.
 #[test]
 fn directions_that_a_motion_lacks_are_added() {
     for (text, force, release, stop) in [(RELEASED, 1.4e-6, true, 77.7e-6), (LOADED, 0.443e-6, false, 38e-6)] {
-        let tol = 1e-2;
-        let built = |formulation, force: f64| {
-            let set = vec![("F".to_owned(), Setting::Number(force))];
-            let options = CompileOptions {
-                segments: Some(2),
-                undamped: true,
-                set,
-                formulation,
-                tol,
-                ..CompileOptions::default()
-            };
-            let bundle = Bundle::from_text("plates.net", text);
-            draw(&NetlistSource::new(&bundle), &options).and_then(|drawn| drawn.compile()).unwrap()
-        };
-        let start = built(Formulation::Compliant, force);
-        let run = |formulation, tol: f64| {
-            let moving = built(formulation, if release { 0.0 } else { force });
-            let options = TransientOptions {
-                stop,
-                signals: vec!["c(7).x".into(), "c(7).y".into()],
-                points: 101,
-                tol,
-                release: release.then_some(&start),
-                ..TransientOptions::default()
-            };
-            let mut run = |options: &TransientOptions<'_>,
-                           sample: &mut dyn FnMut(f64, &[f64]),
-                           watch: bimorph_analysis::ProgressCallback<'_>| {
-                Ok((transient(&moving, options, sample, watch)?, ()))
-            };
-            let mut sent = 0;
-            let mut count = |_: f64, _: &[f64]| sent += 1;
-            let (result, ()) = with_step_error(&options, &moving, &mut run, &mut count, &mut |_| true).unwrap();
-            assert_eq!(sent, options.points);
-            result
-        };
-        let (known, found) = (run(Formulation::Compliant, 1e-4), run(Formulation::Reduced, tol));
-        for (known, signal) in known.signals.iter().zip(&found.signals) {
-            let error = difference(&signal.2, &known.2);
-            println!("{}: {error:.1e}, {:?} estimated, {} unknowns", signal.0, found.step_error, found.unknowns);
-            assert!(error <= tol, "{}: {error:e}", signal.0);
-        }
-        assert!(found.step_error.is_some_and(|error| error <= tol), "{:?}", found.step_error);
+        let (known, found) = PlateMotion { text, force, release, node: "c(7)", stop }.confirmed();
         let full = found.warnings.iter().any(|warning| warning.starts_with("W053"));
         assert!(full != (found.unknowns < known.unknowns), "{} unknowns, {:?}", found.unknowns, found.warnings);
     }
+}
+
+/// A direction without mass, as the rotation within a flexure is, does not join where it bears no energy either. With two of them the release of a plate had six
+/// directions. Inexact forces moved one of these with accelerations that pushed the plate as well: it was late by a constant 5 ns, which is an error of 2.1e-2 with 3e-3 stated.
+#[test]
+fn directions_without_mass_or_energy_are_left_out() {
+    let (_, found) = PlateMotion { text: PLATE, force: 10.22e-6, release: true, node: "c", stop: 5e-6 }.confirmed();
+    assert_eq!(found.unknowns, 4);
 }

@@ -37,11 +37,11 @@ impl PartialEq for Directions {
 }
 
 impl Directions {
-    /// Those for the run after one with these corrections: in more directions, and with sharper polynomials.
-    pub(super) fn after(&self, system: &System, corrections: &MotionCorrections) -> Self {
+    /// Those for the run after one with these corrections, to a tolerance: in more directions, and with sharper polynomials.
+    pub(super) fn after(&self, system: &System, corrections: &MotionCorrections, errors: ErrorBudget) -> Self {
         let Self::Trained { training, polynomials } = self else { return self.clone() };
         let polynomials = polynomials.next_polynomials();
-        let Some(more) = enriched(training, system, corrections) else {
+        let Some(more) = enriched(training, system, corrections, errors) else {
             return Self::Trained { training: Arc::clone(training), polynomials };
         };
         let (directions, strains) = (more.space.size(), more.space.joints.tree.coordinates);

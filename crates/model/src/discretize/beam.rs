@@ -63,9 +63,9 @@ pub fn lay(
     let shift = [along * ends[0].offset, along * -ends[1].offset];
     let (start, end) = (rigid.position(beam.a.0) + shift[0], rigid.position(beam.b.0) + shift[1]);
     let bar = Bar { end_excess: excess.mass, ..bar_between(beam, options, ends.each_ref().map(|end| end.offset)) };
-    let give = shear_flexibility(beam);
+    let sprung_shear = shear_flexibility(beam);
     let wall = rigid.grounded(beam.b.0);
-    let drawn_as = JointProperties { bar, give, segments, wall, ends: *ends, drag_excess: excess.drag };
+    let drawn_as = JointProperties { bar, sprung_shear, segments, wall, ends: *ends, drag_excess: excess.drag };
     let JointBuilder { joints, couplings, bodies, of_beams, known } = out;
     let StiffenedBeam { cut, strained, dragged, .. } = sprung(known, drawn_as, options);
     let segments = segments.max(1);
@@ -125,8 +125,8 @@ pub fn lay(
 struct JointProperties {
     /// Between the junctions.
     bar: Bar,
-    /// Shear flexibility of the section (1/N).
-    give: f64,
+    /// Shear flexibility of the section (1/N), which the bar has where its ends have springs.
+    sprung_shear: f64,
     segments: usize,
     /// Its far end is part of the ground.
     wall: bool,
@@ -162,9 +162,12 @@ fn sprung<'a>(
     }
     // a rigid beam is the rods of a single segment, which its one body holds together
     let scheme = if drawn.segments == 0 { Scheme::B } else { options.scheme };
-    let cut = scheme.cut(&drawn.bar, drawn.segments.max(1), drawn.wall);
-    let elastic = drawn.ends.iter().any(|end| end.elastic);
-    let strained = if options.junctions == Junctions::Calibrated || elastic {
+    let springs = options.junctions == Junctions::Calibrated || drawn.ends.iter().any(|end| end.elastic);
+    // its second-order strain is that of the sheared segment as well; joints that only turn have no shear
+    let sheared = springs && matches!(scheme, Scheme::B | Scheme::E4 | Scheme::Auto | Scheme::Es);
+    let shear = if sheared { drawn.sprung_shear } else { drawn.bar.shear };
+    let cut = scheme.cut(&Bar { shear, ..drawn.bar }, drawn.segments.max(1), drawn.wall);
+    let strained = if springs {
         let mut springs = Springs::default();
         (0..cut.pins.len()).map(|k| springs.with(&drawn, &cut, k)).collect()
     } else {
@@ -211,7 +214,7 @@ impl Springs {
     ///
     /// A joint with rigid directions takes the bending part of the springs alone.
     fn with_ends(&mut self, drawn: &JointProperties, cut: &SegmentedBeam, k: usize) -> JointStress {
-        let JointProperties { bar, give, ends, .. } = drawn;
+        let JointProperties { bar, ends, .. } = drawn;
         let pin = &cut.pins[k];
         // without a spring at an end, its joint equals the others to the last bit
         let next = [(k == 0).then_some(&ends[0]), (k == cut.pins.len() - 1).then_some(&ends[1])];
@@ -230,10 +233,7 @@ impl Springs {
             springs[(2, 2)] = bent;
         }
         let plain = (pin.stiffness, pin.second);
-        let Some(mut own) = self.compliance(&pin.stiffness) else { return plain };
-        if bar.shear == 0.0 && !pin.locked[1] {
-            own[(1, 1)] += pin.length * give;
-        }
+        let Some(own) = self.compliance(&pin.stiffness) else { return plain };
         let Some(whole) = (own + springs).cholesky() else { return plain };
         // what only turns has no second-order strain
         let second = if locked || next == [None; 2] {

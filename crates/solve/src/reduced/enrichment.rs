@@ -5,10 +5,15 @@
 //! frequencies of a reduced model are too high, and the curvature of large motions. The corrections of a run are compressed by their
 //! singular values in the mass norm, and the leading ones join the directions. A run in the space of both differs from the first one by the
 //! error of the first.
+//!
+//! The rest of a correction beside the directions may have hardly any mass, as the rotation of a body within a beam has. Inexact forces of the next run would move
+//! it with accelerations that exceed all others. It joins only if it bears energy or moves mass beside the motion.
 
+use super::ReducedForces;
 use super::energy::{EnergyProduct, EnergyVector};
 use super::space::ReducedSpace;
 use super::training::Training;
+use bimorph_base::ErrorBudget;
 use bimorph_domains::System;
 use bimorph_multibody::joint_coordinates::sprung_loops::Tree;
 use bimorph_multibody::planar::Pose;
@@ -37,14 +42,17 @@ struct Correction {
 #[derive(Debug, Clone, Default)]
 pub struct MotionCorrections {
     kept: Vec<Correction>,
+    /// The largest motion in the mass norm (√(kg)·m).
+    largest: f64,
     /// One of so many is kept.
     stride: usize,
     seen: usize,
 }
 
 impl MotionCorrections {
-    /// Adds that of the displacements at a place of the bodies.
-    pub fn add(&mut self, tree: &Tree, at: &[Pose], correction: &[Pose]) {
+    /// Adds that of the displacements at a place of the bodies, in a motion that has been as large as `largest` in the mass norm (√(kg)·m).
+    pub fn add(&mut self, tree: &Tree, (at, largest): (&[Pose], f64), correction: &[Pose]) {
+        self.largest = largest;
         let due = self.seen.is_multiple_of(self.stride.max(1));
         self.seen += 1;
         if !due || correction.iter().any(|c| !c.iter().all(|x| x.is_finite())) {
@@ -86,25 +94,39 @@ impl MotionCorrections {
     }
 }
 
-/// The training with the directions of the corrections of a run; none where they add none.
-pub fn enriched(training: &Training, system: &System, corrections: &MotionCorrections) -> Option<Training> {
+/// The training with the directions of the corrections of a run to a tolerance; none where they add none.
+pub fn enriched(
+    training: &Training,
+    system: &System,
+    corrections: &MotionCorrections,
+    errors: ErrorBudget,
+) -> Option<Training> {
     let space = &training.space;
     let product = EnergyProduct::at_rest(&space.joints);
+    let strains: Vec<EnergyVector> = corrections.kept.iter().map(|kept| product.of(kept.strains.clone())).collect();
+    let mut placed = ReducedForces::new(space);
+    placed.place_at_rest(space, &vec![0.0; space.size()]);
+    let mut moved = vec![Pose::zeros(); system.bodies()];
     let mut basis: Vec<EnergyVector> = space.directions.iter().map(|x| product.of(x.clone())).collect();
+    let mut reach = space.reach.clone();
     for shape in corrections.shapes(system) {
+        let before = basis.len();
         product.extend(&mut basis, shape, NEW);
+        let Some(direction) = basis.get(before) else { continue };
+        let most = strains.iter().map(|x| product.product(direction, x).abs()).fold(0.0, f64::max);
+        placed.placed.spread(&space.joints.tree, &direction.x, &mut moved);
+        let mass = system.model.mass_product(&moved, &moved).sqrt();
+        if errors.is_negligible_direction(most, space.amplitude)
+            && errors.is_negligible_direction(most * mass, corrections.largest)
+        {
+            basis.pop();
+        } else {
+            reach.push(REACH * most);
+        }
     }
     let (before, m) = (space.size(), basis.len());
     if m == before {
         return None;
-    }
-    let mut reach = space.reach.clone();
-    reach.resize(m, 0.0);
-    for correction in &corrections.kept {
-        let strains = product.of(correction.strains.clone());
-        for (reach, b) in reach.iter_mut().zip(&basis).skip(before) {
-            *reach = reach.max(REACH * product.product(b, &strains).abs());
-        }
     }
     let further: f64 = reach[before..].iter().map(|reach| reach * reach).sum();
     let amplitude = space.amplitude.hypot(further.sqrt());

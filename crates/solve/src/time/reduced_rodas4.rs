@@ -581,7 +581,7 @@ impl Method<Bodies<'_>> for ReducedRodas4 {
         if error.is_finite() {
             // a correction beyond the motion is none
             if let Some(corrections) = corrections.as_mut().filter(|_| error < *largest) {
-                corrections.add(&self.space.joints.tree, &end.q, check.step());
+                corrections.add(&self.space.joints.tree, (&end.q, *largest), check.step());
             }
             if looks {
                 estimate.squares += error * error;
