@@ -116,9 +116,7 @@ pub fn enriched(
         let most = strains.iter().map(|x| product.product(direction, x).abs()).fold(0.0, f64::max);
         placed.placed.spread(&space.joints.tree, &direction.x, &mut moved);
         let mass = system.model.mass_product(&moved, &moved).sqrt();
-        if errors.is_negligible_direction(most, space.amplitude)
-            && errors.is_negligible_direction(most * mass, corrections.largest)
-        {
+        if errors.is_negligible_direction([most / space.amplitude, most * mass / corrections.largest]) {
             basis.pop();
         } else {
             reach.push(REACH * most);
