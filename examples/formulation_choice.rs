@@ -10,7 +10,7 @@
 //! Each run has a line. `steps` are accepted ones, and `all_steps` those of all runs with rejected ones. `whole_ms` is the time of the analysis with its
 //! mesh, the least of some. `work` counts all runs: solves, forces and factorizations, weighted as `bimorph chart` does, times unknowns. Bodies also go by
 //! other methods, which are given up after twenty times the time of the default one. `scripts/profiles` draws performance profiles. The error is the root mean
-//! square of the worst signal, of its amplitude, from `auto` at a hundredth of the tolerance. A refusal stands in place of the numbers. The summary goes to
+//! square of the worst signal, of its amplitude, from `auto` at a hundredth of the tolerance. That is no reference if it reports more than the tolerance, or no error. A refusal stands in place of the numbers. The summary goes to
 //! standard error.
 
 use bimorph::analysis::chart::passes;
@@ -146,6 +146,7 @@ struct Summary {
 /// Every formulation on one mechanism at one tolerance, and bodies by other methods.
 fn compare(number: usize, scene: &Scene, (tol, methods): (f64, &[Integrator]), counts: &mut Summary) {
     let reference = run(scene, Way::by(Formulation::Auto, tol / 100.0), 1);
+    let reference = reference.ok().filter(|done| reported(&done.result) <= tol);
     let line = |name: &str, done: &Result<Done, String>| {
         print!("{number},{},{tol:e},{name},", KINDS[number % KINDS.len()]);
         match done {
@@ -188,8 +189,7 @@ fn compare(number: usize, scene: &Scene, (tol, methods): (f64, &[Integrator]), c
             }
         }
         // one whose error is beyond the tolerance has not answered
-        let holds =
-            |done: &Done| reference.as_ref().map_or(true, |best| self::error(&best.result, &done.result) <= tol);
+        let holds = |done: &Done| reference.as_ref().is_none_or(|best| self::error(&best.result, &done.result) <= tol);
         if let Some(done) = done.ok().filter(holds) {
             let (steps, ms) = best.unwrap_or((u64::MAX, f64::INFINITY));
             best = Some((steps.min(done.steps), ms.min(done.whole)));

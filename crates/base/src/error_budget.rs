@@ -41,7 +41,7 @@ impl ErrorBudget {
     const RATES_WITHIN_STEP: f64 = 0.05;
     /// Least fraction of the tolerance that is left to the steps beside the mesh.
     const LEAST_FOR_STEPS: f64 = 0.35;
-    /// Fraction of that for an error that a run propagates. Both errors may have one sign: with 0.85 a run of 160 random mechanisms exceeded its tolerance by 4 %.
+    /// Fraction of that for an error that a run propagates. Both errors may have one sign: of 320 runs of random mechanisms one would exceed its tolerance at 0.85, by 4 %.
     const PROPAGATED: f64 = 0.8;
     /// Ratio of the tolerance of a companion run to that of the run.
     const COMPANION: f64 = 10.0;
@@ -86,7 +86,7 @@ impl ErrorBudget {
     /// check adds what is lacking, and for motion, which passes through states that no equilibrium has.
     const SINGULAR_VALUES: [f64; 2] = [0.3, 0.02];
     /// Fractions of the tolerance below which a direction without mass adds nothing to a reduced model: of the energy norm of a motion, and of its mass norm. A direction
-    /// with mass may matter more than its share, since runs that lack it alike do not differ.
+    /// with mass may matter more than its share, and two runs without it do not show that.
     const NEGLIGIBLE_DIRECTION: [f64; 2] = [0.1, 1e-3];
     /// Fraction of the tolerance for the forces of a field at fewer points.
     const REDUCED_FIELD: f64 = 0.1;

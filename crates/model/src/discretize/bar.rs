@@ -1,7 +1,6 @@
 //! Effect of the options on a beam's section: a bar, with or without shear and rotary inertia.
 
 use super::scheme::{Bar, POINT_EXCESS};
-use crate::options::CompileOptions;
 use bimorph_structure::Beam;
 
 /// Shear coefficient of a rectangular section: G·As = κ·G·A.
@@ -23,14 +22,8 @@ pub fn bar(beam: &Beam, shear: bool, rotary: bool) -> Bar {
     }
 }
 
-/// The bar of a beam between its junctions, which take these lengths of it (m).
-pub(super) fn bar_between(beam: &Beam, options: &CompileOptions, offsets: [f64; 2]) -> Bar {
-    let bar = bar(beam, options.shear, options.rotary_inertia);
-    Bar { length: beam.length - (offsets[0] + offsets[1]), ..bar }
-}
-
 /// Shear flexibility 1/(G·As) of a beam's section (1/N).
-pub(super) fn shear_flexibility(beam: &Beam) -> f64 {
+fn shear_flexibility(beam: &Beam) -> f64 {
     let m = &beam.material;
     let shear_modulus = m.shear_modulus.unwrap_or_else(|| m.youngs_modulus / (2.0 * (1.0 + m.poisson)));
     1.0 / (SHEAR_COEFFICIENT * shear_modulus * beam.width * beam.thickness)

@@ -4,15 +4,13 @@
 //! rods outside it belong to the bodies of the nodes. The springs' compliance is added to that of the first and the
 //! last joint.
 
-use super::bar::bar_between;
-use super::bar::shear_flexibility;
 pub use super::bar::{SHEAR_COEFFICIENT, bar};
-use super::junction_springs::JunctionEnd;
+use super::junction_springs::{JunctionEnd, bar_between, has_springs};
 use super::rigid::{Lump, RigidGroups};
 use super::scheme::{Bar, BeamSegment, EndExcess, SegmentJoint, SegmentedBeam};
 use super::sprung::second_strain;
 use super::stressed::SegmentSpan;
-use crate::options::{CompileOptions, Junctions, Scheme};
+use crate::options::{CompileOptions, Scheme};
 use bimorph_domains::MaterialPoint;
 use bimorph_multibody::{BodyName, Coupling, Joint};
 use bimorph_structure::{Beam, Structure};
@@ -62,10 +60,9 @@ pub fn lay(
     let drawn = [rigid.point(beam.a.0), rigid.point(beam.b.0)];
     let shift = [along * ends[0].offset, along * -ends[1].offset];
     let (start, end) = (rigid.position(beam.a.0) + shift[0], rigid.position(beam.b.0) + shift[1]);
-    let bar = Bar { end_excess: excess.mass, ..bar_between(beam, options, ends.each_ref().map(|end| end.offset)) };
-    let sprung_shear = shear_flexibility(beam);
+    let bar = Bar { end_excess: excess.mass, ..bar_between(beam, options, ends) };
     let wall = rigid.grounded(beam.b.0);
-    let drawn_as = JointProperties { bar, sprung_shear, segments, wall, ends: *ends, drag_excess: excess.drag };
+    let drawn_as = JointProperties { bar, segments, wall, ends: *ends, drag_excess: excess.drag };
     let JointBuilder { joints, couplings, bodies, of_beams, known } = out;
     let StiffenedBeam { cut, strained, dragged, .. } = sprung(known, drawn_as, options);
     let segments = segments.max(1);
@@ -125,8 +122,6 @@ pub fn lay(
 struct JointProperties {
     /// Between the junctions.
     bar: Bar,
-    /// Shear flexibility of the section (1/N), which the bar has where its ends have springs.
-    sprung_shear: f64,
     segments: usize,
     /// Its far end is part of the ground.
     wall: bool,
@@ -162,12 +157,8 @@ fn sprung<'a>(
     }
     // a rigid beam is the rods of a single segment, which its one body holds together
     let scheme = if drawn.segments == 0 { Scheme::B } else { options.scheme };
-    let springs = options.junctions == Junctions::Calibrated || drawn.ends.iter().any(|end| end.elastic);
-    // its second-order strain is that of the sheared segment as well; joints that only turn have no shear
-    let sheared = springs && matches!(scheme, Scheme::B | Scheme::E4 | Scheme::Auto | Scheme::Es);
-    let shear = if sheared { drawn.sprung_shear } else { drawn.bar.shear };
-    let cut = scheme.cut(&Bar { shear, ..drawn.bar }, drawn.segments.max(1), drawn.wall);
-    let strained = if springs {
+    let cut = scheme.cut(&drawn.bar, drawn.segments.max(1), drawn.wall);
+    let strained = if has_springs(options, &drawn.ends) {
         let mut springs = Springs::default();
         (0..cut.pins.len()).map(|k| springs.with(&drawn, &cut, k)).collect()
     } else {

@@ -24,9 +24,8 @@
 //!
 //! The drag of a beam has the same shares, with an excess that leaves the drag of each body positive.
 
-use super::bar::bar_between;
 use super::beam::drag_per_mass;
-use super::junction_springs::JunctionEnd;
+use super::junction_springs::{JunctionEnd, bar_between};
 use super::rigid::{Lump, RigidGroups, UnfinishedBody};
 use super::scheme::{Bar, BeamSegment, EndExcess, POINT_EXCESS, rods};
 use crate::options::{CompileOptions, Scheme};
@@ -116,7 +115,7 @@ fn add_ends(
 ) {
     let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
     // what rotary inertia adds is left to the body
-    let bar = Bar { rotary: 0.0, ..bar_between(beam, options, ends.each_ref().map(|end| end.offset)) };
+    let bar = Bar { rotary: 0.0, ..bar_between(beam, options, ends) };
     for (end, node) in [beam.a.0, beam.b.0].into_iter().enumerate() {
         let point = rigid.point(node);
         let BodyId::Free(k) = point.body else { continue };

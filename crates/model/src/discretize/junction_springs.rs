@@ -14,6 +14,7 @@
 use super::bar::bar;
 use super::junction_table::{self as table, ComplianceRow};
 use super::scheme::Bar;
+use crate::options::{CompileOptions, Junctions};
 use bimorph_structure::Beam;
 use nalgebra::Matrix3;
 
@@ -71,6 +72,17 @@ impl JunctionEnd {
         let carry = Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, d, sign);
         carry.transpose() * self.spring * carry
     }
+}
+
+/// The bar of a beam between its junctions, as the model has it: with springs at its ends it is flexible in shear.
+pub(super) fn bar_between(beam: &Beam, options: &CompileOptions, ends: &[JunctionEnd; 2]) -> Bar {
+    let bar = bar(beam, options.shear || has_springs(options, ends), options.rotary_inertia);
+    Bar { length: beam.length - (ends[0].offset + ends[1].offset), ..bar }
+}
+
+/// Whether the ends of a beam have springs: with calibrated junctions, and at elastic anchors.
+pub(super) fn has_springs(options: &CompileOptions, ends: &[JunctionEnd; 2]) -> bool {
+    options.junctions == Junctions::Calibrated || ends.iter().any(|end| end.elastic)
 }
 
 /// Step by which an edge is moved outwards, in widths.

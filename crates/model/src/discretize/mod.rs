@@ -61,7 +61,7 @@ pub use crate::options::{Anchors, Junctions, Scheme};
 use bimorph_multibody::planar::DOF;
 pub use error::{DiscretizeError, MAX_SEGMENTS};
 use free_rotation::BodyActions;
-use junction_springs::JunctionEnd;
+use junction_springs::{JunctionEnd, bar_between};
 use scheme::Bar;
 
 use crate::options::CompileOptions;
@@ -101,12 +101,11 @@ pub struct Assembly {
 }
 
 impl Assembly {
-    /// The bar of each beam between its junctions, as the model has it: with calibrated junctions and at elastic anchors it is flexible in shear.
+    /// The bar of each beam between its junctions, as the model has it.
     pub(crate) fn bars(&self, structure: &Structure, options: &CompileOptions) -> Vec<Bar> {
-        let one = |((beam, ends), excess): ((&Beam, &[JunctionEnd; 2]), &scheme::EndExcess)| {
-            let springs = options.junctions == Junctions::Calibrated || ends.iter().any(|end| end.elastic);
-            let bar = bar::bar(beam, options.shear || springs, options.rotary_inertia);
-            Bar { length: beam.length - ends[0].offset - ends[1].offset, end_excess: excess.mass, ..bar }
+        let one = |((beam, ends), excess): ((&Beam, &[JunctionEnd; 2]), &scheme::EndExcess)| Bar {
+            end_excess: excess.mass,
+            ..bar_between(beam, options, ends)
         };
         structure.beams.iter().zip(&self.ends.beams).zip(&self.end_excess).map(one).collect()
     }

@@ -6,8 +6,8 @@
 //! singular values in the mass norm, and the leading ones join the directions. A run in the space of both differs from the first one by the
 //! error of the first.
 //!
-//! The rest of a correction beside the directions may have hardly any mass, as the rotation of a body within a beam has. Inexact forces of the next run would move
-//! it with accelerations that exceed all others. It joins only if it bears energy or moves mass beside the motion.
+//! A new direction may have hardly any mass, as the rotation of a body within a beam has. Small errors of the polynomials would accelerate it more than all others. So
+//! it joins only if it has a part of the energy or of the moving mass of the motion.
 
 use super::ReducedForces;
 use super::energy::{EnergyProduct, EnergyVector};
